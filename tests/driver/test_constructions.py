@@ -356,7 +356,7 @@ def test_command_lists_constructions(capsys: pytest.CaptureFixture[str]) -> None
 
 
 def test_command_refuses_what_is_no_floor(errors_of: ErrorsOf) -> None:
-    assert "--construction" in errors_of("floor")
+    assert "no floor" in errors_of("floor")
     assert "'concrete 180'" in errors_of("floor", "--construction", "conrete 180")
     twice = ("--construction", "concrete 180") * 2
     assert "also names another floor" in errors_of("floor", *twice)

@@ -402,7 +402,7 @@ def test_command_writes_the_chart(folder: Path, capsys: pytest.CaptureFixture[st
     printed = capsys.readouterr().out
     assert printed.startswith("ball 7\n")
     assert re.search(r"63 Hz, dB: .*\+0\.3", printed)
-    assert f"Chart: {chart / 'history.svg'}" in " ".join(printed.split())
+    assert f"Results: {chart}" in " ".join(printed.split())
 
 
 @pytest.mark.parametrize(

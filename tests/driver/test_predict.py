@@ -386,7 +386,7 @@ def test_tyre_falls_on_constructions(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 
 def test_bad_input_is_one_sentence(tmp_path: Path, errors_of: ErrorsOf) -> None:
-    assert "--construction" in errors_of("predict")
+    assert "no floor" in errors_of("predict")
     assert "'concrete 180'" in errors_of("predict", "--construction", "conrete 180")
     (tmp_path / "bare.nml").write_text(MINIMAL, encoding="utf-8")
     message = errors_of("predict", tmp_path / "bare.nml", "-o", tmp_path / "out")

@@ -4,41 +4,29 @@ from __future__ import annotations
 
 import argparse
 import os
-import re
 import signal
 import sys
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 from thud.base.bridge import version
-from thud.base.checks import suggestion
+from thud.base.checks import refuse, suggestion
 from thud.base.errors import InputError, NumericalError, ThudError
 from thud.base.tables import wrap
-from thud.cli.case_commands import (
-    ASSESS,
-    EXAMPLES,
-    EXPORT,
-    compare_cases,
-    run_cases,
-)
+from thud.cli.case_commands import ASSESS, COMPARE, EXAMPLES, EXPORT, RUN
 from thud.cli.command import (
-    FORMAT,
-    NO_FIGURES,
-    QUIET,
+    FILE_KINDS,
     Command,
-    argument,
     exit_code,
-    file_of,
+    kind_of,
     message_of,
-    output,
     print_immediately,
 )
 from thud.cli.explore_command import EXPLORE
 from thud.cli.floor_commands import FLOOR, LISTEN, MOBILITY, PREDICT, RATE
-from thud.cli.recording_commands import CALIBRATE, MEASURE, run_history
+from thud.cli.recording_commands import CALIBRATE, HISTORY, MEASURE
 from thud.cli.screen import is_terminal, print_error
 from thud.cli.study_commands import study_commands
 from thud.cli.surrogate_command import SURROGATE
-from thud.level.levels import FORCES, SOURCES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -49,92 +37,14 @@ if TYPE_CHECKING:
 INTERRUPTED = 128
 
 COMMANDS = {
-    "run": Command(
-        "run cases, write their results and figures",
-        (
-            argument(
-                "cases", nargs="+", type=file_of("case"), metavar="CASE.nml", help="namelist files"
-            ),
-            *output(
-                "the results; several cases have a subdirectory each (default: outputs/<case name>)"
-            ),
-            argument(
-                "--check",
-                action="store_true",
-                help="exit with 3 unless all sources conform with the values of their cases "
-                "(assess --check: over what is not known)",
-            ),
-            NO_FIGURES,
-            FORMAT,
-            argument(
-                "--all",
-                action="store_true",
-                help="also write quantities of the model against time (model_histories.csv) and "
-                "every figure",
-            ),
-            argument(
-                "--animation",
-                action="store_true",
-                help="also write motion.gif of cases with snapshots",
-            ),
-            argument(
-                "-v",
-                "--verbose",
-                action="store_true",
-                help="also show numbers of the solver: resolution, quantities of the model",
-            ),
-            QUIET,
-        ),
-        run_cases,
-    ),
+    "run": RUN,
     "assess": ASSESS,
-    "compare": Command(
-        "compare models and recordings of the same drop on one page",
-        (
-            argument(
-                "cases",
-                nargs="+",
-                type=file_of("case", "recording"),
-                metavar="CASE.nml|RECORD.csv",
-                help="namelist files, and recordings with columns of time, s, and force, N",
-            ),
-            *output("the page (default: outputs/comparison)"),
-            argument(
-                "--force",
-                choices=FORCES,
-                help="force to compare (default: &levels force of each case)",
-            ),
-            argument(
-                "--source",
-                choices=SOURCES,
-                help="source of the limits (default: &limits source of the cases)",
-            ),
-            QUIET,
-        ),
-        compare_cases,
-        "nothing is written",
-    ),
+    "compare": COMPARE,
     "explore": EXPLORE,
     "measure": MEASURE,
     "calibrate": CALIBRATE,
     "export": EXPORT,
-    "history": Command(
-        "control chart of a ball from its calibration reports",
-        (
-            argument(
-                "reports",
-                nargs="+",
-                metavar="REPORT",
-                help="report.json files, or directories with such files",
-            ),
-            *output("the chart (default: outputs/history)"),
-            argument(
-                "--different-balls", action="store_true", help="allow reports of different balls"
-            ),
-            QUIET,
-        ),
-        run_history,
-    ),
+    "history": HISTORY,
     "rate": RATE,
     "floor": FLOOR,
     "listen": LISTEN,
@@ -150,7 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command with arguments, by default those of this process; return the exit code."""
     after_interrupt = Command._field_defaults["after_interrupt"]
     try:
-        options = _parse(arguments)
+        options = _parse(sys.argv[1:] if arguments is None else arguments)
         if isinstance(options, int):
             code = options
         else:
@@ -158,8 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             after_interrupt = command.after_interrupt
             folder = getattr(options, "output", None)
             if folder is not None and not folder.strip():
-                message = "--output has no value; allowed: a path"
-                raise InputError(message)
+                refuse("--output has no value", "a path")
             with print_immediately():
                 code = command.function(options)
         print(end="", flush=True)
@@ -183,8 +92,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return code
 
 
-def _parse(arguments: Sequence[str] | None) -> argparse.Namespace | int:
-    """Return the options, or an exit code if argparse has printed help or an error."""
+def _parse(arguments: Sequence[str]) -> argparse.Namespace | int:
+    """Return the options, or an exit code if argparse has printed help or an error.
+
+    Raise InputError for an unknown command, which may be a file of a known kind.
+    """
+    first = next(iter(arguments), "-")
+    if not first.startswith("-") and first not in COMMANDS:
+        if kind := kind_of(first):
+            refuse(f"{first} is a {kind}, no command", f"thud-driver {FILE_KINDS[kind][1]}")
+        refuse(f"{first} is no command{suggestion(first, COMMANDS)}", ", ".join(COMMANDS))
     try:
         return new_parser().parse_args(arguments)
     except SystemExit as stop:
@@ -193,35 +110,11 @@ def _parse(arguments: Sequence[str] | None) -> argparse.Namespace | int:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Parser that suggests a similar word, and raises if its output cannot be written."""
-
-    def error(self, message: str) -> NoReturn:
-        match = re.search(r"(?:invalid choice: '|unrecognized arguments: )([\w-]+)", message)
-        super().error(message + (_hint(match[1]) if match else ""))
+    """Parser that wraps messages, and raises if its output cannot be written."""
 
     def _print_message(self, message: str, file: SupportsWrite[str] | None = None) -> None:
         to_screen = file in {None, sys.stderr} and is_terminal(sys.stderr)
         print(wrap(message) if to_screen else message, end="", file=file or sys.stderr)
-
-
-def _hint(word: str) -> str:
-    """Return the commands that have an option, or the suggestion of a similar word."""
-    owners = [
-        name
-        for name, command in COMMANDS.items()
-        if any(word in names for names, _ in command.arguments)
-    ]
-    if owners:
-        return f" ({word} is an option of {', '.join(owners)})"
-    return suggestion(word, _words())
-
-
-def _words() -> list[str]:
-    """Return all commands, options, and choices of options."""
-    arguments = [entry for command in COMMANDS.values() for entry in command.arguments]
-    options = [name for names, _ in arguments for name in names if name.startswith("--")]
-    choices = [choice for _, settings in arguments for choice in settings.get("choices", ())]
-    return [*COMMANDS, *options, *choices]
 
 
 def new_parser() -> argparse.ArgumentParser:

@@ -4,30 +4,34 @@ from __future__ import annotations
 
 import os
 import shutil
-import warnings
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from tqdm import tqdm
 
-from thud.base._schema import VERDICTS
 from thud.base.bridge import ask, notes
 from thud.base.checks import refuse
 from thud.base.display import warn_if_not_drawn
-from thud.base.errors import InputError, PlausibilityWarning, ThudError
+from thud.base.errors import ThudError
 from thud.base.files import Results, inputs_folder
 from thud.base.tables import format_rows
 from thud.case.case import Case, read_case
 from thud.cli.command import (
+    NO_FIGURES,
     NOT_CONFORMING,
-    PAGE,
     QUIET,
     Command,
     argument,
     exit_code,
     file_of,
+    files,
+    finish,
+    flag,
+    kind_of,
     message_of,
+    number,
+    option,
     output,
     results_of,
 )
@@ -35,6 +39,7 @@ from thud.cli.screen import print_error, print_notes, print_path, print_results,
 from thud.impact.compression import new_curve
 from thud.impact.compute import compute, new_impact
 from thud.impact.free_modes import new_modes
+from thud.level.levels import FORCES, SOURCES
 
 if TYPE_CHECKING:
     import argparse
@@ -78,11 +83,11 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
     # Windows and macOS do not distinguish case.
     key = case.name.casefold()
     if key in options.done:
-        message = (
+        refuse(
             f"{path}: {case.name!r} is also the name of {options.done[key]}, "
-            "whose results would be replaced; allowed: different names, or separate runs"
+            "whose results would be replaced",
+            "different names, or separate runs",
         )
-        raise InputError(message)
     options.done[key] = path
     results = Results(
         Path(output or Path("outputs", case.name)),
@@ -105,6 +110,29 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
     return bool(answer["conforms"])
 
 
+RUN = Command(
+    "run cases, write their results and figures",
+    (
+        files("cases", "CASE.nml", "namelist files", "case", nargs="+"),
+        *output(
+            "the results; several cases have a subdirectory each (default: outputs/<case name>)"
+        ),
+        flag("--check", "exit with 3 unless all sources conform with the values of their cases "
+             "(assess --check: over what is not known)"),
+        NO_FIGURES,
+        argument("--format", choices=("svg", "png", "pdf"), default="svg",
+                 help="format of the figures (default: svg)"),
+        flag("--all", "also write quantities of the model against time (model_histories.csv) and "
+             "every figure"),
+        flag("--animation", "also write motion.gif of cases with snapshots"),
+        argument("-v", "--verbose", action="store_true",
+                 help="also show numbers of the solver: resolution, quantities of the model"),
+        QUIET,
+    ),
+    run_cases,
+)  # fmt: skip
+
+
 def assess_case(options: argparse.Namespace) -> int:
     """Assess a case over what is not known of its source; return the exit code."""
     from thud.studies.calibrated_set import assess
@@ -113,28 +141,22 @@ def assess_case(options: argparse.Namespace) -> int:
     results = results_of(options, f"{case.name}_verdict", (options.case,), case.name)
     results.require()
     verdict = assess(case, progress=shows_progress(quiet=options.quiet))
-    results.write({"verdict.csv": verdict.to_csv().encode()})
-    if not options.quiet:
-        print_results("\n".join([format_rows(verdict.rows()), *verdict.notes]))
-        print_path("Results", results.folder)
-    return NOT_CONFORMING if options.check and verdict.conforms != VERDICTS[0] else 0
+    shown = "\n".join([format_rows(verdict.rows()), *verdict.notes])
+    contents = {"verdict.csv": verdict.to_csv().encode()}
+    return finish(options, results, contents, shown, verdict=verdict)
 
 
 ASSESS = Command(
     "assess a case over what is not known of its source",
     (
-        argument("case", type=file_of("case"), metavar="CASE.nml", help="namelist file"),
+        files("case", "CASE.nml", "namelist file", "case"),
         *output("the verdict (default: outputs/<case name>_verdict)"),
-        argument(
-            "--check",
-            action="store_true",
-            help="exit with 3 unless the source conforms over what is not known of it "
-            "(run --check: with the values of the case)",
-        ),
+        flag("--check", "exit with 3 unless the source conforms over what is not known of it "
+             "(run --check: with the values of the case)"),
         QUIET,
     ),
     assess_case,
-)
+)  # fmt: skip
 
 
 def _figures(answer: Bundle, options: argparse.Namespace) -> dict[str, bytes]:
@@ -169,22 +191,28 @@ def compare_cases(options: argparse.Namespace) -> int:
     from thud.comparison import comparison
 
     results = results_of(options, "comparison", options.cases)
-    results.require(f"comparison{ending}" for ending in PAGE)
+    results.require(f"comparison{ending}" for ending in (".svg", ".html"))
     items = comparison.read_all(options.cases)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", PlausibilityWarning)
-        page = comparison.compare(
-            items,
-            options.force,
-            options.source,
-            progress=shows_progress(quiet=options.quiet),
-        )
-    print_notes(page.warnings)
-    paths = results.write(page.files())
-    if not options.quiet:
-        print_results(format_rows(page.rows()))
-        print_path("Page", paths[-1])
-    return 0
+    progress = shows_progress(quiet=options.quiet)
+    page = comparison.compare(items, options.force, options.source, progress=progress)
+    return finish(options, results, page.files(), format_rows(page.rows()), page.warnings)
+
+
+COMPARE = Command(
+    "compare models and recordings of the same drop on one page",
+    (
+        files("cases", "CASE.nml|RECORD.csv", "namelist files, and recordings with columns of "
+              "time, s, and force, N", "case", "recording", nargs="+"),
+        *output("the page (default: outputs/comparison)"),
+        argument("--force", choices=FORCES,
+                 help="force to compare (default: &levels force of each case)"),
+        argument("--source", choices=SOURCES,
+                 help="source of the limits (default: &limits source of the cases)"),
+        QUIET,
+    ),
+    compare_cases,
+    "nothing is written",
+)  # fmt: skip
 
 
 # Help of the options that choose formats.
@@ -205,25 +233,19 @@ def run_export(options: argparse.Namespace) -> int:
     if not chosen:
         refuse("export: no format is chosen", ", ".join(f"--{kind}" for kind in KINDS))
     source = _read_source(options.source, options.config)
-    print_notes(source.warnings)
     force = force_files.blocked_force(source, drop=options.drop, rate=options.rate)
     formats = (force_files.EXPORTS[kind] for kind in chosen)
     contents = {f"{force.name}{ending}": make(force) for ending, make in formats}
     inputs = options.source, options.config
     results = results_of(options, f"{force.name}_export", inputs, force.name)
-    paths = results.write(contents)
-    if not options.quiet:
-        print(*paths, sep="\n")
-    return 0
+    return finish(options, results, contents, "\n".join(contents), source.warnings)
 
 
 def _read_source(path: str, config: str | None) -> ImpactResult:
     """Return the recording in a file, or the impact of the case in it."""
-    from thud.recordings.formats import FORMATS
     from thud.recordings.read_recording import read_recording
 
-    endings = {ending for file_format in FORMATS for ending in file_format.suffixes}
-    if os.path.splitext(path)[1].lower() in endings:  # noqa: PTH122 - may hold a zero byte
+    if kind_of(path) == "recording":
         return read_recording(path, config=config)
     if config is not None:
         refuse(f"{path}: --config {config} is for recordings only", "none for a case")
@@ -233,22 +255,12 @@ def _read_source(path: str, config: str | None) -> ImpactResult:
 EXPORT = Command(
     "write the blocked force of a case or a recording for other programs",
     (
-        argument(
-            "source",
-            type=file_of("case", "recording"),
-            metavar="CASE.nml|RECORDING",
-            help="namelist file, or recording",
-        ),
-        *(
-            argument(f"--{kind}", action="store_true", help=meaning)
-            for kind, meaning in KINDS.items()
-        ),
+        files("source", "CASE.nml|RECORDING", "namelist file, or recording", "case", "recording"),
+        *(flag(f"--{kind}", meaning) for kind, meaning in KINDS.items()),
         *output("the files (default: outputs/<name>_export)"),
-        argument("--rate", type=float, metavar="HZ", help="resample to this rate"),
-        argument(
-            "--drop", type=int, default=1, help="index of the drop in a recording (default: 1)"
-        ),
-        argument("--config", metavar="LAB.toml", help="configuration of a recording"),
+        option("--rate", "HZ", "resample to this rate", type=number),
+        option("--drop", "N", "index of the drop in a recording (default: 1)", type=int, default=1),
+        option("--config", "LAB.toml", "configuration of a recording", type=file_of("TOML file")),
         QUIET,
     ),
     run_export,
@@ -276,15 +288,10 @@ def copy_examples(options: argparse.Namespace) -> int:
 EXAMPLES = Command(
     "copy the inputs of the documentation: cases, studies, recordings, floors, constructions",
     (
-        argument(
-            "directory",
-            nargs="?",
-            default="inputs",
-            metavar="DIR",
-            help="new directory (default: inputs)",
-        ),
+        argument("directory", nargs="?", default="inputs", metavar="DIR",
+                 help="new directory (default: inputs)"),
         QUIET,
     ),
     copy_examples,
     "copied files are kept",
-)
+)  # fmt: skip

@@ -1,4 +1,4 @@
-"""Commands of ``thud-driver``: their type, shared arguments and messages."""
+"""Commands of ``thud-driver``: their type, shared arguments, results and messages."""
 
 from __future__ import annotations
 
@@ -8,17 +8,19 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from thud.base._schema import VERDICTS
 from thud.base.display import draw_all, warn_if_not_drawn
-from thud.base.errors import InputError, ReportWarning, ThudError
+from thud.base.errors import InputError, PlausibilityWarning, ReportWarning, ThudError
 from thud.base.files import Results
 from thud.cli.screen import print_notes, print_path, print_results
 from thud.recordings.formats import FORMATS
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
+    from collections.abc import Callable, Iterable, Iterator, Mapping
 
-    from thud.floors.mobility_fit import MobilityFit
-    from thud.floors.survey import RoomLevels
+    from matplotlib.figure import Figure
+
+    from thud.level.assessment import Verdict
 
 # Exit code of `--check` if a source does not conform.
 NOT_CONFORMING = 3
@@ -41,28 +43,68 @@ def argument(*names: str, **settings: object) -> Argument:
     return names, settings
 
 
-# Kinds of files by their endings, and the commands that read them.
-FILE_KINDS = {".nml": "case", ".toml": "TOML file"} | dict.fromkeys(
-    (ending for entry in FORMATS for ending in entry.suffixes), "recording"
+def flag(name: str, meaning: str) -> Argument:
+    """Return an option without a value."""
+    return argument(name, action="store_true", help=meaning)
+
+
+def option(name: str, value: str, meaning: str, **settings: object) -> Argument:
+    """Return an option with a value, such as ``"HZ"``."""
+    return argument(name, metavar=value, help=meaning, **settings)
+
+
+_OF_TOML = (
+    "fit, sweep, sensitivity, design, uncertainty or surrogate (a study), floor, listen or predict "
+    "(a construction), measure --config (a laboratory)"
 )
-READERS = {
-    "case": "run, assess, compare, floor and predict",
-    "TOML file": "sweep, sensitivity, design, uncertainty, surrogate and fit (or --construction)",
-    "recording": "measure",
-}
+# Kinds of files: their endings, and the commands that read them.
+FILE_KINDS: dict[str, tuple[tuple[str, ...], str]] = {
+    "case": ((".nml",), "run, assess, compare, export, explore, floor, listen or predict"),
+    "TOML file": ((".toml",), _OF_TOML),
+    "recording": (tuple(ending for entry in FORMATS for ending in entry.suffixes),
+                  "measure, calibrate, compare or export"),
+    "calibration report": ((".json",), "history"),
+    "table of levels": ((".xlsx",), "rate"),
+    "surrogate": ((".npz",), "a study with [surrogate] file"),
+    "directory": ((), "explore or history"),
+}  # fmt: skip
+
+
+def kind_of(text: str) -> str:
+    """Return the kind of a file by its ending, empty if it is not known; see `FILE_KINDS`."""
+    try:
+        if Path(text).is_dir():
+            return "directory"
+    except ValueError:  # a zero byte
+        return ""
+    ending = Path(text).suffix.lower()
+    return next((kind for kind, (endings, _) in FILE_KINDS.items() if ending in endings), "")
 
 
 def file_of(*kinds: str) -> Callable[[str], str]:
     """Return the type of an argument that is a file of some kinds, which its ending shows."""
 
     def path(text: str) -> str:
-        kind = FILE_KINDS.get(Path(text).suffix.lower())
-        if kind is None or kind in kinds:
-            return text
-        message = f"{text} is a {kind}; allowed: a {' or '.join(kinds)}; for it: {READERS[kind]}"
-        raise argparse.ArgumentTypeError(message)
+        kind = kind_of(text)
+        if kind and kind not in kinds:
+            message = (
+                f"{text} is a {kind}; allowed: a {' or '.join(kinds)}; for it: "
+                f"thud-driver {FILE_KINDS[kind][1]}"
+            )
+            raise argparse.ArgumentTypeError(message)
+        endings = (ending for name in kinds for ending in FILE_KINDS[name][0])
+        meant = next((text + e for e in endings if not kind and Path(text + e).is_file()), "")
+        if meant:
+            message = f"{text} has no ending; allowed: {meant}"
+            raise argparse.ArgumentTypeError(message)
+        return text
 
     return path
+
+
+def files(name: str, value: str, meaning: str, *kinds: str, nargs: str | None = None) -> Argument:
+    """Return an argument that is a file of some kinds, or several such files."""
+    return argument(name, metavar=value, help=meaning, type=file_of(*kinds), nargs=nargs)
 
 
 def number(text: str) -> float:
@@ -75,12 +117,14 @@ def number(text: str) -> float:
         raise argparse.ArgumentTypeError(message) from error
 
 
-REPLACE = argument("--replace", action="store_true", help="also replace results of something else")
+QUIET = argument("-q", "--quiet", action="store_true", help="show only errors and warnings")
+NO_FIGURES = flag("--no-figures", "write only the results")
 
 
 def output(meaning: str) -> tuple[Argument, Argument]:
     """Return the arguments of a command that writes results."""
-    return argument("-o", "--output", metavar="DIR", help=f"directory for {meaning}"), REPLACE
+    folder = argument("-o", "--output", metavar="DIR", help=f"directory for {meaning}")
+    return folder, flag("--replace", "also replace results of something else")
 
 
 def results_of(
@@ -102,21 +146,44 @@ def results_of(
     )
 
 
-# Endings of the files of a page.
-PAGE = (".svg", ".html")
-QUIET = argument("-q", "--quiet", action="store_true", help="show only errors and warnings")
-NO_FIGURES = argument("--no-figures", action="store_true", help="write only the results")
-FORMAT = argument(
-    "--format",
-    choices=("svg", "png", "pdf"),
-    default="svg",
-    help="format of the figures (default: svg)",
-)
+def figures_of(
+    options: argparse.Namespace, draws: Mapping[str, Callable[[], Figure | None]]
+) -> dict[str, bytes]:
+    """Return the figures that a command draws, as files, unless it is to draw none."""
+    contents: dict[str, bytes] = {}
+    if not getattr(options, "no_figures", False):
+        with warn_if_not_drawn("a figure"):
+            from thud.plot.save_figures import figure_files
+
+            contents = figure_files(draw_all(draws), getattr(options, "format", "svg"))
+    return contents
+
+
+def finish(  # noqa: PLR0913, PLR0917 - all that a command shows
+    options: argparse.Namespace,
+    results: Results,
+    contents: Mapping[str, bytes],
+    shown: str,
+    notes: Iterable[object] = (),
+    verdict: Verdict | None = None,
+) -> int:
+    """Write files, print text, notes and the path of the results; return the exit code.
+
+    With the option `check` the code is that of the verdict.
+    """
+    results.write(contents)
+    if not options.quiet:
+        print_results(shown)
+    print_notes(notes)
+    if not options.quiet:
+        print_path("Results", results.folder)
+    fails = verdict is not None and options.check and verdict.conforms != VERDICTS[0]
+    return NOT_CONFORMING if fails else 0
 
 
 @contextmanager
 def print_immediately() -> Iterator[None]:
-    """Print warnings of reports as soon as they arise."""
+    """Print warnings of reports as soon as they arise; results hold those of plausibility."""
     usual = warnings.showwarning
 
     def show(warning: Any, kind: type[Warning], *origin: Any) -> None:  # noqa: ANN401 - of any warning
@@ -127,36 +194,9 @@ def print_immediately() -> Iterator[None]:
 
     with warnings.catch_warnings():
         warnings.simplefilter("always", ReportWarning)
+        warnings.simplefilter("ignore", PlausibilityWarning)
         warnings.showwarning = show  # type: ignore[assignment]
         yield
-
-
-def save_result(  # noqa: PLR0913, PLR0917 - all differ between commands
-    options: argparse.Namespace,
-    source: str,
-    result: MobilityFit | RoomLevels,
-    shown: str,
-    file: tuple[str, bytes],
-    figure: str,
-) -> int:
-    """Save file and figure of a result, print text and warnings; return the exit code.
-
-    `source` is the path of the input file.
-    """
-    results = results_of(options, result.name, [source])
-    contents = dict([file])
-    if not options.no_figures:
-        with warn_if_not_drawn(figure):
-            from thud.plot.save_figures import figure_files
-
-            contents |= figure_files(draw_all({figure: result.plot}))
-    results.write(contents)
-    if not options.quiet:
-        print_results(shown)
-    print_notes(result.notes)
-    if not options.quiet:
-        print_path("Results", results.folder)
-    return 0
 
 
 def exit_code(error: Exception) -> int:

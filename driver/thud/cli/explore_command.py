@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from thud.base.checks import refuse
 from thud.base.extras import require_extra
-from thud.cli.command import QUIET, Command, argument
+from thud.cli.command import QUIET, Command, files, flag, option
 from thud.cli.screen import print_notes, print_path, print_results
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def explore(options: argparse.Namespace) -> int:
     """Serve the page until interrupted; return the exit code."""
     with require_extra("explorer"):
         from thud.explorer.server import new_application, run_server, start_with
-    start = start_with(options.case)
+    start = start_with(options.case and Path(options.case))
     token = secrets.token_urlsafe(16)
     version_6 = ":" in options.host
     host = f"[{options.host}]" if version_6 else options.host
@@ -99,22 +99,14 @@ def _redirect(folder: Path, address: str) -> str:
 EXPLORE = Command(
     "interactive page in a browser",
     (
-        argument(
-            "case",
-            nargs="?",
-            metavar="CASE.nml|RESULTS",
-            help="case, or directory of results, to start with (default: a standard ball)",
-            type=Path,
-        ),
-        argument(
-            "--host",
-            default=LOOPBACK[0],
-            help=f"address to listen on (default: {LOOPBACK[0]}, this machine only)",
-        ),
-        argument("--port", type=int, default=0, help="port to listen on (default: any free port)"),
-        argument("--no-browser", action="store_true", help="only print the address"),
+        files("case", "CASE.nml|RESULTS", "case, or directory of results, to start with (default: "
+              "a standard ball)", "case", "directory", nargs="?"),
+        option("--host", "HOST", f"address to listen on (default: {LOOPBACK[0]}, this machine "
+               "only)", default=LOOPBACK[0]),
+        option("--port", "PORT", "port to listen on (default: any free port)", type=int, default=0),
+        flag("--no-browser", "only print the address"),
         QUIET,
     ),
     explore,
     "nothing is written",
-)
+)  # fmt: skip

@@ -6,22 +6,24 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from thud.base._schema import VERDICTS
 from thud.base.checks import refuse
-from thud.base.display import draw_all
 from thud.base.tables import format_rows
 from thud.cli.command import (
     NO_FIGURES,
-    NOT_CONFORMING,
     QUIET,
     Command,
     argument,
+    figures_of,
     file_of,
+    files,
+    finish,
+    flag,
     number,
+    option,
     output,
     results_of,
 )
-from thud.cli.screen import print_notes, print_path, print_results, shows_progress
+from thud.cli.screen import print_notes, print_results, shows_progress
 from thud.recordings.config import Config, read_config
 
 if TYPE_CHECKING:
@@ -43,11 +45,9 @@ def measure(options: argparse.Namespace) -> int:
     from thud.report.rows import excluded_text
 
     figures = not options.no_figures
-    files = results_of(
-        options, Path(options.recordings[0]).stem, [*options.recordings, options.config]
-    )
-    files.require(recording_files.file_names(figures=figures, stages=options.stages))
-    folder = files.folder
+    inputs = [*options.recordings, options.config]
+    results = results_of(options, Path(options.recordings[0]).stem, inputs)
+    results.require(recording_files.file_names(figures=figures, stages=options.stages))
     config = read_config(options.config) if options.config else Config()
     config = config.updated(
         leave_out=_left_out(options) or None,
@@ -55,29 +55,22 @@ def measure(options: argparse.Namespace) -> int:
     )
     progress = shows_progress(quiet=options.quiet)
     recording = read_recording(options.recordings, config=config, progress=progress)
-    verdict = recording.assess()
     stages = recording.stages if options.stages else None
-    recording_files.save(recording, files, figures=figures, stages=stages)
-    if not options.quiet:
-        rows = recording_files.drop_table(recording)
-        print_results(format_rows(rows[: MAX_PRINTED + 1]))
-        if len(rows) > MAX_PRINTED + 1:
-            print_path(f"and {len(rows) - MAX_PRINTED - 1} more drops", folder / "report.json")
-        criteria = criteria_data(recording)
-        print_results(f"\n{format_rows(recording_files.table(criteria))}\n")
-        for step in sentences(recording, is_warning=False):
-            print_results(f"  {step}")
-        print_results(f"  {recording_files.verdict_text(recording, criteria)}")
-        excluded = excluded_text(criteria)
-        if excluded:
-            print_results(f"  {excluded}")
-        if figures:
-            missing = ", ".join(missing_fields(recording.config, recording.origins)) or "nothing"
-            print_results(f"  Missing in the report (ISO/IEC 17025:2017, 7.8): {missing}")
-    print_notes(sentences(recording, is_warning=True))
-    if not options.quiet:
-        print_path("Results", folder)
-    return NOT_CONFORMING if options.check and verdict.conforms != VERDICTS[0] else 0
+    recording_files.save(recording, results, figures=figures, stages=stages)
+    rows, criteria = recording_files.drop_table(recording), criteria_data(recording)
+    parts = [format_rows(rows[: MAX_PRINTED + 1])]
+    if len(rows) > MAX_PRINTED + 1:
+        path = results.folder / "report.json"
+        parts.append(f"and {len(rows) - MAX_PRINTED - 1} more drops: {path}")
+    parts += ["", format_rows(recording_files.table(criteria)), ""]
+    lines = [*sentences(recording, is_warning=False)]
+    lines += [recording_files.verdict_text(recording, criteria), excluded_text(criteria)]
+    if figures:
+        missing = ", ".join(missing_fields(recording.config, recording.origins)) or "nothing"
+        lines.append(f"Missing in the report (ISO/IEC 17025:2017, 7.8): {missing}")
+    shown = "\n".join([*parts, *(f"  {line}" for line in lines if line)])
+    notes = sentences(recording, is_warning=True)
+    return finish(options, results, {}, shown, notes, recording.assess())
 
 
 def _left_out(options: argparse.Namespace) -> dict[str, str]:
@@ -122,41 +115,24 @@ def _option(name: str) -> Argument:
 MEASURE = Command(
     "levels, verdict and calibration report of recorded drops",
     (
-        argument(
-            "recordings",
-            nargs="+",
-            type=file_of("recording"),
-            metavar="FILE",
-            help="recordings of one or more drops each",
-        ),
-        argument(
-            "--config", metavar="LAB.toml", help="file on laboratory, instruments, calibration"
-        ),
+        files("recordings", "FILE", "recordings of one or more drops each", "recording", nargs="+"),
+        option("--config", "LAB.toml", "file on laboratory, instruments, calibration",
+               type=file_of("TOML file")),
         *map(_option, OF_THE_CONFIGURATION),
-        argument("--leave-out", action="append", metavar="NUMBERS", help="drops to be left out"),
-        argument("--because", action="append", metavar="TEXT", help="why drops are left out"),
+        option("--leave-out", "NUMBERS", "drops to be left out", action="append"),
+        option("--because", "TEXT", "why drops are left out", action="append"),
         *output("the results (default: outputs/<name of the first file>)"),
-        argument("--check", action="store_true", help="exit with 3 unless the source conforms"),
-        argument(
-            "--stages",
-            action="store_true",
-            help="draw the first drop after each stage of its measurement (stages.svg)",
-        ),
+        flag("--check", "exit with 3 unless the source conforms"),
+        flag("--stages", "draw the first drop after each stage of its measurement (stages.svg)"),
         NO_FIGURES,
         QUIET,
     ),
     measure,
-)
+)  # fmt: skip
 
 
 # Options of `calibrate` for a known force.
-OF_A_FORCE = (
-    "mass",
-    "force",
-    "gravity",
-    "uncertainty",
-    "unit",
-)
+OF_A_FORCE = ("mass", "force", "gravity", "uncertainty", "unit")
 
 
 def run_calibrate(options: argparse.Namespace) -> int:
@@ -174,15 +150,9 @@ def run_calibrate(options: argparse.Namespace) -> int:
             print_results(f"# {plate}")
         print_notes(note.message for note in plate.notes)
         return 0
-    result = calibrate(
-        options.record,
-        force=options.force,
-        mass=options.mass,
-        gravity=options.gravity,
-        channel=options.channel,
-        unit=options.unit,
-        uncertainty=options.uncertainty or 0.0,
-    )
+    chosen = {name: getattr(options, name) for name in (*OF_A_FORCE, "channel")}
+    chosen["uncertainty"] = options.uncertainty or 0.0
+    result = calibrate(options.record, **chosen)
     print(f'calibration = "{result.chain}"')
     print(f"calibration_uncertainty = {result.uncertainty:.2g}")
     if not options.quiet:
@@ -197,59 +167,44 @@ def run_calibrate(options: argparse.Namespace) -> int:
 CALIBRATE = Command(
     "calibration from a record of a known force applied to or removed from the plate, or of taps",
     (
-        argument(
-            "record",
-            type=file_of("recording"),
-            metavar="FILE",
-            help="record of the known force or of the taps",
-        ),
-        argument(
-            "--tap",
-            action="store_true",
-            help="the record holds taps with a hammer: print the resonance of the plate",
-        ),
-        argument("--mass", type=number, metavar="KG", help="mass that exerts the known force"),
-        argument("--force", type=number, metavar="N", help="known force, if no mass is given"),
-        argument(
-            "--gravity",
-            type=number,
-            metavar="M/S2",
-            help="local gravity for --mass, such as 9.798 (default: 9.80665, with an uncertainty)",
-        ),
-        argument(
-            "--uncertainty",
-            type=number,
-            metavar="FRACTION",
-            help="relative standard uncertainty of the mass or force, such as 0.001",
-        ),
-        argument("--channel", metavar="NAME|NUMBER", help="channel of the force"),
-        argument("--unit", help="unit of the recorded values, if the file does not state it"),
+        files("record", "FILE", "record of the known force or of the taps", "recording"),
+        flag("--tap", "the record holds taps with a hammer: print the resonance of the plate"),
+        option("--mass", "KG", "mass that exerts the known force", type=number),
+        option("--force", "N", "known force, if no mass is given", type=number),
+        option("--gravity", "M/S2", "local gravity for --mass, such as 9.798 (default: 9.80665, "
+               "with an uncertainty)", type=number),
+        option("--uncertainty", "FRACTION", "relative standard uncertainty of the mass or force, "
+               "such as 0.001", type=number),
+        option("--channel", "NAME|NUMBER", "channel of the force"),
+        option("--unit", "UNIT", "unit of the recorded values, if the file does not state it"),
         QUIET,
     ),
     run_calibrate,
     "nothing is written",
-)
+)  # fmt: skip
 
 
 def run_history(options: argparse.Namespace) -> int:
     """Draw the control chart of the reports of a ball; return the exit code."""
     # Matplotlib and SciPy are slow to import.
-    from thud.plot.save_figures import figure_files
     from thud.report.ball_history import read_history
     from thud.report.ball_history_figure import draw_history
 
     history = read_history(options.reports, different_balls=options.different_balls)
     results = results_of(options, "history", options.reports)
-    figures = draw_all({"history": partial(draw_history, history)})
-    paths = results.write(figure_files(figures))
-    if not options.quiet:
-        print_results(history.title)
-        print_results(format_rows(history.table()))
-        marks = history.marks()
-        if marks:
-            print_results(marks)
-        for warning in history.warnings():
-            print_results(warning)
-        if paths:
-            print_path("Chart", paths[0])
-    return 0
+    contents = figures_of(options, {"history": partial(draw_history, history)})
+    parts = [history.title, format_rows(history.table()), history.marks(), *history.warnings()]
+    return finish(options, results, contents, "\n".join(filter(None, parts)))
+
+
+HISTORY = Command(
+    "control chart of a ball from its calibration reports",
+    (
+        files("reports", "REPORT", "report.json files, or directories with such files",
+              "calibration report", "directory", nargs="+"),
+        *output("the chart (default: outputs/history)"),
+        flag("--different-balls", "allow reports of different balls"),
+        QUIET,
+    ),
+    run_history,
+)  # fmt: skip

@@ -5,10 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from thud.base.display import draw_all
 from thud.base.tables import format_rows
-from thud.cli.command import NO_FIGURES, QUIET, Command, argument, file_of, output
-from thud.cli.screen import print_notes, print_path, print_results, shows_progress
+from thud.cli.command import (
+    NO_FIGURES,
+    QUIET,
+    Command,
+    figures_of,
+    files,
+    finish,
+    option,
+    output,
+)
+from thud.cli.screen import shows_progress
 
 if TYPE_CHECKING:
     import argparse
@@ -25,25 +33,17 @@ def train(options: argparse.Namespace) -> int:
         progress=shows_progress(quiet=options.quiet),
     )  # fmt: skip
     contents = {training.file: trained.to_bytes()}
-    if not options.no_figures:
-        from thud.plot.save_figures import figure_files
-
-        contents |= figure_files(draw_all({training.name: trained.plot}))
-    training.results(folder, replace=options.replace).write(contents)
-    if not options.quiet:
-        print_results(format_rows(trained.rows()))
-    print_notes(trained.notes)
-    if not options.quiet:
-        print_path("Results", folder)
-    return 0
+    contents |= figures_of(options, {training.name: trained.plot})
+    results = training.results(folder, replace=options.replace)
+    return finish(options, results, contents, format_rows(trained.rows()), trained.notes)
 
 
 SURROGATE = Command(
     "train a fast approximation of a slow model for other studies",
     (
-        argument("study", type=file_of("TOML file"), metavar="STUDY.toml", help="study file"),
+        files("study", "STUDY.toml", "study file", "TOML file"),
         *output("the surrogate; a training goes on there (default: outputs/<study name>)"),
-        argument("--workers", type=int, metavar="N", help="threads (default: one per processor)"),
+        option("--workers", "N", "threads (default: one per processor)", type=int),
         NO_FIGURES,
         QUIET,
     ),
