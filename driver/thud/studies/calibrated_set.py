@@ -99,8 +99,15 @@ def assess(case: Case | Impact, *, progress: bool = False) -> Verdict:
     alone = blocked_case(case, stated)
     varied, fixed = _varied_set(alone, sets)
     case = _calibrated_mesh(alone.resolved())
+    for unknown in stated:
+        ends = {unknown.key: np.array([unknown.low, unknown.high])}
+        if np.array_equal(*_criteria(case, ends, progress=False)):
+            refuse(
+                f"&unknowns: {unknown.key} = {unknown.low:g} and {unknown.high:g} make the same "
+                "drop: this source does not use it",
+                "keys that change the drop of the case",
+            )
     if stated:
-        _require_effects(case, stated)
         varied = _samples(case, varied, stated)
         fixed = tuple(key for key in fixed if key not in varied)
     # The first drop is that of the case.
@@ -115,35 +122,30 @@ def assess(case: Case | Impact, *, progress: bool = False) -> Verdict:
         f"not known: {', '.join(columns)}",
         *map(str, stated),
         *compute(with_values(alone, {key: float(x[0]) for key, x in columns.items()})).warnings,
-        f"fixed by the case: {', '.join(fixed)}" if fixed else "",
-        _CALIBRATION if sets else "",
+        *([f"fixed by the case: {', '.join(fixed)}"] if fixed else []),
+        *([_CALIBRATION] if sets else []),
     )
-    return _verdict(case, columns, values[~failed], fixed, tuple(filter(None, notes)))
+    return _verdict(case, columns, values[~failed], fixed, notes)
 
 
 def _varied_set(case: Case, sets: Mapping[str, Values]) -> tuple[Columns, tuple[str, ...]]:
     """Return the parameters of the sets for a case, and the keys that the case fixes."""
     model, result = case.model, dict(sets)
-    if not (sets and model):
-        return result, ()
-    stated = {key for key in sets if _is_stated(case, key) or _is_of_other_law(case, key)}
-    if _is_stated(case, "loss_frequency"):
+
+    def is_stated(key: str) -> bool:
+        return getattr(model, key, getattr(case.ball, key, None)) is not None
+
+    stated = {key for key in sets if is_stated(key)}
+    if is_stated("loss_frequency"):
         stated.add("loss_factor")
-    if "youngs_modulus" in stated and case.ball.youngs_modulus:
+    # Keys of another damping law than that of the case.
+    needs = {key: find_key(key, case)[0].needs for key in sets}
+    stated |= {key for key, need in needs.items() if need and getattr(model, need[0]) != need[1]}
+    if sets and model and "youngs_modulus" in stated and case.ball.youngs_modulus:
         ratio = case.ball.youngs_modulus / STANDARD_BALL[model.name, "youngs_modulus"]
         result["youngs_modulus"] = ratio * sets["youngs_modulus"]
     fixed = tuple(key for key in sets if key in stated and key != "youngs_modulus")
     return {key: column for key, column in result.items() if key not in fixed}, fixed
-
-
-def _is_stated(case: Case, key: str) -> bool:
-    return getattr(case.model, key, getattr(case.ball, key, None)) is not None
-
-
-def _is_of_other_law(case: Case, key: str) -> bool:
-    """Return whether the case has another damping law than that whose key the sets have."""
-    entry, _ = find_key(key, case)
-    return bool(entry.needs) and getattr(case.model, entry.needs[0]) != entry.needs[1]
 
 
 def _calibrated_mesh(case: Case) -> Case:
@@ -166,20 +168,6 @@ def _samples(case: Case, sets: Columns, unknowns: tuple[Unknown, ...]) -> Column
     return result
 
 
-def _require_effects(case: Case, unknowns: tuple[Unknown, ...]) -> None:
-    """Raise InputError for an unknown whose ends make the same drop."""
-    for unknown in unknowns:
-        low, high = _criteria(
-            case, {unknown.key: np.array([unknown.low, unknown.high])}, progress=False
-        )
-        if np.array_equal(low, high):
-            refuse(
-                f"&unknowns: {unknown.key} = {unknown.low:g} and {unknown.high:g} make the same "
-                "drop: this source does not use it",
-                "keys that change the drop of the case",
-            )
-
-
 def _criteria(case: Case, columns: Columns, *, progress: bool) -> Values:
     """Return the criteria of drops, shape (n, n_criterion); NaN: no result.
 
@@ -193,31 +181,22 @@ def _criteria(case: Case, columns: Columns, *, progress: bool) -> Values:
             "a source, and ranges of &unknowns, whose drops have results",
         )
     force = case.levels.force
-    forces = drops.elastic_force if force == "elastic" else drops.floor_force
-    assert forces is not None  # noqa: S101 - `forces` was asked for
     peaks = [
         np.nan if lost else peak_count(history, drops.sample_rate)
-        for history, lost in zip(forces, failed, strict=True)
+        for history, lost in zip(getattr(drops, f"{force}_force"), failed, strict=True)
     ]
     others = [columns.get(key, value_in(case, key)) for key in ("mass", "height")]
-    return np.column_stack(
-        [
-            getattr(drops, f"{force}_octave"), drops.contact_time, drops.restitution, peaks,
-            *(np.broadcast_to(np.asarray(other, dtype=float), failed.size) for other in others),
-        ]
-    )  # fmt: skip
+    fixed = [np.broadcast_to(np.asarray(other, dtype=float), failed.size) for other in others]
+    levels = getattr(drops, f"{force}_octave")
+    return np.column_stack([levels, drops.contact_time, drops.restitution, peaks, *fixed])
 
 
 def _verdict(
     case: Case, columns: Columns, values: Values, fixed: tuple[str, ...], notes: tuple[str, ...]
 ) -> Verdict:
     """Return the verdict by the criteria of drops, of which the first is that of the case."""
-    octaves, others = np.split(values[0], [5])
-    contact_time, restitution, peaks, mass, height = others.tolist()
-    plain = assess_levels(
-        octaves, contact_time, restitution, peaks, mass, height, case.limits.source
-    )
-    drops = values[1:]
+    first, drops = values[0].tolist(), values[1:]
+    plain = assess_levels(first[:5], *first[5:], case.limits.source)
     limits = np.array([(criterion.lower, criterion.upper) for criterion in plain.criteria])
     inside = (drops >= limits[:, 0]) & (drops <= limits[:, 1])
     criteria = tuple(
@@ -239,17 +218,11 @@ def _main_unknown(columns: Columns, values: Values) -> str:
     """Return the unknown with the largest rank correlation; empty if the values do not vary."""
     if np.ptp(values) <= _ROUNDING * np.abs(values).max():
         return ""
-    ranks = _ranks(values)
+    # Equal values have one rank.
+    ranks = np.unique(values, return_inverse=True)[1]
     sizes = {
-        key: abs(float(np.corrcoef(_ranks(column[1:]), ranks)[0, 1]))
+        key: abs(float(np.corrcoef(np.unique(column[1:], return_inverse=True)[1], ranks)[0, 1]))
         for key, column in columns.items()
         if np.ptp(column[1:]) > 0
     }
     return max(sizes, key=lambda key: sizes[key], default="")
-
-
-def _ranks(values: Values) -> Values:
-    """Return the ranks of values; equal values have their mean rank."""
-    _, inverse, counts = np.unique(values, return_inverse=True, return_counts=True)
-    ranks: Values = (np.cumsum(counts) - (counts - 1) / 2)[inverse]
-    return ranks
