@@ -20,7 +20,7 @@ Made by ``./bootstrap schema`` from ``thud --schema``; do not edit.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 from thud.base.key import Group, Key, Quantity
@@ -161,7 +161,6 @@ def python_class(
         default = python_default(key)
         if key["group"] != group:
             words.append(f"group ``&{key['group']}``")
-            default = f'field(default={default}, metadata={{"group": "{key["group"]}"}})'
         type_name = python_type(key)
         text = INDENT + "; ".join(filter(None, words)) + "."
         plain_type = type_name.replace("Sequence[", "sequence of ").rstrip("]")
@@ -267,8 +266,10 @@ def python_module(schema: Entry) -> str:
               [f"{name}.name: {name}" for name in map(class_name, models)]),
         table("Floors by name, the default first.", "FLOORS: dict[str, type[FloorOptions]]",
               [f"{name}.name: {name}" for name in map(class_name, floors)]),
-        table("Groups that every model uses.", "GROUPS",
+        table("Groups that every model uses.", "GROUPS: dict[str, type[Group]]",
               [f"{quoted(group)}: {class_name(group)}" for group in groups]),
+        table("Groups that a case may have.", "OPTIONAL_GROUPS: dict[str, type[Group]]",
+              [f"{quoted(group)}: {class_name(group)}" for group in optional]),
         quantity_class("ImpactQuantities", "Numbers that describe an impact.", of_impacts, "float"),
         quantity_class("SampleQuantities", "Numbers that describe each of many samples.",
                        of_samples, "NDArray[np.float64]", ", shape (n_sample,)"),
@@ -305,6 +306,9 @@ def python_module(schema: Entry) -> str:
         "\n# Every key, in the order of an input file.\nKEYS = (\n",
         *(f"    {python_key(key)},\n" for key in keys),
         ")\n",
+        "_CLASSES = {**GROUPS, **OPTIONAL_GROUPS, **MODELS, **FLOORS}\n",
+        "for _name, _class in _CLASSES.items():\n",
+        "    _class.keys = {key.name: key for key in KEYS if (key.owner or key.group) == _name}\n",
     ]  # fmt: skip
     return "".join(parts)
 
@@ -395,6 +399,7 @@ def python_key(key: Entry) -> str:
     if "lower" in key:
         parts += [key["lower"], key["upper"], *([True] if key["whole"] else [])]
     words = [quoted(p) if isinstance(p, str) else repr(p) for p in parts]
+    words += [f"{end}=True" for end in ("lower_open", "upper_open") if key.get(end)]
     if key["needs"]:
         words.append(f"needs={tuple(map(str, key['needs']))}")
     return f"Key({', '.join(words)})"

@@ -10,8 +10,10 @@ import pytest
 from conftest import INPUTS, MINIMAL, names_in, naming
 
 import thud
+from thud.base._schema import FLOORS, GROUPS, MODELS, OPTIONAL_GROUPS
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from conftest import CaseFile, Run
@@ -46,10 +48,49 @@ def test_cases_do_not_change() -> None:
 
 
 def test_invalid_case_is_not_written(tmp_path: Path) -> None:
-    case = thud.Case(ball=thud.Ball(mass=-1.0))
-    with pytest.raises(thud.InputError, match=naming("&ball: mass", -1.0, "1000000 kg")):
+    case = thud.Case(ball=thud.Ball(wall_thickness=0.1))
+    with pytest.raises(thud.InputError, match=naming("&ball: wall_thickness", 0.1, 0.089)):
         thud.write_case(case, tmp_path / "case.nml")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("make", "subject", "value", "ends"),
+    [
+        (lambda: thud.Ball(outer_radius=-1), "ball.outer_radius", -1, (0, 10)),
+        (lambda: thud.Ball(outer_radius=0), "ball.outer_radius", 0, (0, 10)),
+        (lambda: thud.Ball(wall_thickness=-1), "ball.wall_thickness", -1, (0, np.nan)),
+        (lambda: thud.Ball(mass=1e9), "ball.mass", 1e9, (1e-12, 1e6)),
+        (lambda: thud.Ball(mass=10**5000), "ball.mass", np.nan, (1e-12, 1e6)),
+        (lambda: thud.Ball(poisson_ratio=0.7), "ball.poisson_ratio", 0.7, (-1, 0.5)),
+        (lambda: thud.Drop(height=np.inf), "drop.height", np.nan, (1e-12, 1e6)),
+        (lambda: thud.Drop(height=np.nan), "drop.height", np.nan, (1e-12, 1e6)),
+        (lambda: thud.Plate(point_x=[1.0, -1.0]), "plate.point_x", -1, (0, 1000)),
+        (lambda: thud.Room(junction_index=()), "room.junction_index", np.nan, (np.nan, np.nan)),
+        (lambda: thud.FiniteElement(radial_elements=-1), "mesh.radial_elements", -1, (0, 64)),
+        (lambda: thud.Plate(edges="x"), "plate.edges", np.nan, (np.nan, np.nan)),  # type: ignore[arg-type]
+        (
+            lambda: thud.Case.from_namelist({"ball": {"mass": "x"}}),
+            "ball.mass", np.nan, (1e-12, 1e6),
+        ),
+    ],
+)  # fmt: skip
+def test_values_are_checked_when_a_group_is_made(
+    make: Callable[[], object], subject: str, value: float, ends: tuple[float, float]
+) -> None:
+    """Keys of a file, such as those of ``&mesh``, are named by their groups there."""
+    with pytest.raises(thud.InputError, match=naming(f"&{subject.replace('.', ': ')}")) as refused:
+        make()
+    note = refused.value.note
+    assert note is not None
+    assert note.subject == subject
+    np.testing.assert_array_equal([note.value, note.low, note.high], [value, *ends])
+
+
+def test_every_default_is_allowed() -> None:
+    for kind in (GROUPS | OPTIONAL_GROUPS | MODELS | FLOORS).values():
+        default = kind()
+        assert kind.keys.keys() == vars(default).keys()
 
 
 def test_failed_write_leaves_nothing_behind(tmp_path: Path) -> None:
@@ -66,8 +107,8 @@ def test_failed_write_leaves_nothing_behind(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("value", [None, [1.0], 1j, {}, b"2"], ids=repr)
 def test_values_of_other_types_are_refused(value: object) -> None:
-    with pytest.raises(thud.InputError, match=naming("&ball: mass", repr(value))):
-        thud.solve(thud.Ball(mass=value))  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match=naming("&ball: mass", repr(value))):
+        thud.Ball(mass=value)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("name", ["a\nb", "a\tb", "a\0b"], ids=repr)

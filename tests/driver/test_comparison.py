@@ -196,7 +196,7 @@ def test_verdict_on_a_record_is_open_where_its_ball_is_not_known(tmp_path: Path)
 
 def test_nothing_and_different_drops_are_told(case_file: CaseFile, tmp_path: Path) -> None:
     for impacts in ({}, np.ma.masked, None):
-        with pytest.raises(thud.InputError, match=naming("impacts")):
+        with pytest.raises((thud.InputError, TypeError), match=naming("impacts")):
             thud.compare(impacts)  # type: ignore[arg-type]
     with pytest.raises(thud.InputError, match=r"a\b.* 4\.429 m/s.* b\b.* 3\.132 m/s"):
         thud.compare(
@@ -205,7 +205,7 @@ def test_nothing_and_different_drops_are_told(case_file: CaseFile, tmp_path: Pat
                 "b": thud.solve(drop=thud.Drop(0.5), model="hollow_sphere"),
             }
         )
-    with pytest.raises(thud.InputError, match=naming("a", 1, "Case")):
+    with pytest.raises(TypeError, match=naming("a", "int", "Case")):
         thud.compare({"a": 1})  # type: ignore[dict-item]
     (tmp_path / "other").mkdir()
     paths = [case_file(MINIMAL), case_file(MINIMAL, "other/case.nml")]

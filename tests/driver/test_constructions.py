@@ -189,7 +189,7 @@ def test_case_has_source_and_room_of_another() -> None:
     assert with_ceiling.room == replace(
         thud.Room(volume=30.0), ceiling_mass=9.0, ceiling_depth=0.2, ceiling_loss_factor=0.3
     )
-    with pytest.raises(thud.InputError, match="Case"):
+    with pytest.raises(TypeError, match="Case"):
         thud.construction("concrete 180").case("concrete_180.nml")  # type: ignore[arg-type]
 
 
@@ -220,7 +220,7 @@ def test_library_is_filtered_by_words() -> None:
 def test_misspelled_name_is_suggested() -> None:
     with pytest.raises(thud.InputError, match=naming("conrete 180", "concrete 180", "TOML")):
         thud.construction("conrete 180")
-    with pytest.raises(thud.InputError, match=naming("3")):
+    with pytest.raises(TypeError, match="str"):
         thud.construction(3)  # type: ignore[arg-type]
 
 
@@ -269,12 +269,12 @@ def test_file_of_a_user_is_a_construction(tmp_path: Path) -> None:
         ('floor = "plate"', 'floor = "plat"', ("floor", "plat", "plate")),
         ('floor = "plate"', 'flor = "plate"', ("flor", "floor")),
         ("thickness = { value", "thicknes = { value", ("thicknes", "thickness")),
-        ("value = 0.2,", "value = 9,", ("plate", "thickness", "9.0", "2 m")),
+        ("value = 0.2,", "value = 9,", ("plate", "thickness", 9, "2 m")),
         ("value = 0.2,", "value = 'thick',", ("thickness", "thick")),
         (', source = "drawing"', "", ("thickness", "source")),
         ('"drawing"', '" "', ("thickness", "source", "text")),
         ("ceiling_mass", "volume", ("room", "volume", "ceiling_mass")),
-        ("value = 12,", "value = -12,", ("room", "ceiling_mass", "-12.0")),
+        ("value = 12,", "value = -12,", ("room", "ceiling_mass", "-12")),
         ("[room]\n", "[rooms]\n", ("rooms", "room")),
         ("density = 960 }]", "density = 0 }]", ("layer", 2, "density", 0)),
         (", density = 960 }]", "}]", ("layer", 2, "density")),

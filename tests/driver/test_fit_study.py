@@ -150,7 +150,7 @@ def test_fit_that_cannot_be_saved_is_refused_before_it_is_made(
     [
         ("youngs_modulus", "hardness", naming("[parameters]", "hardness", "outer_radius")),
         ("MPa", "mm", naming("[parameters] youngs_modulus", "'mm'", "Pa", "kPa")),
-        ("1.4", "-1", naming("youngs_modulus", "start", "-1e+06", 0)),
+        ("1.4", "-1", naming("youngs_modulus", "-1000000.0", 0)),
         ("1.4", "'soft'", naming("youngs_modulus", "start", "'soft'")),
         ("1.4", "nan", naming("start", "nan")),
         ("1.4", f"1{'0' * 400}", naming("youngs_modulus", "start")),
@@ -167,8 +167,8 @@ def test_fit_that_cannot_be_saved_is_refused_before_it_is_made(
         ("[target]", "starts = 1.5\n[target]", naming("starts", 1.5, 1)),
         ("[target]", "seed = -1\n[target]", naming("seed", -1, 0)),
         ("[target]", "confidence = 2\n[target]", naming("confidence", 2, 0, 1)),
-        ("[target]", "fixed.mass = -1\n[target]", naming("[fixed]", "&ball: mass", -1.0)),
-        ("[target]", "fixed.density = -1\n[target]", naming("[fixed]", "&ball: mass", "kg")),
+        ("[target]", "fixed.mass = -1\n[target]", naming("&ball: mass", -1.0)),
+        ("[target]", "fixed.density = -1\n[target]", naming("&ball: mass", "kg")),
         (
             "[target]",
             "fixed.youngs_modulus = 1\n[target]",

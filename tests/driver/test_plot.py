@@ -62,9 +62,9 @@ def test_levels_show_the_tolerance_band(shell: thud.Impact, source: str) -> None
 
 def test_useless_impacts_are_refused() -> None:
     for impacts in ({}, [], thud.solve()):
-        with pytest.raises(thud.InputError, match=naming("impacts")):
+        with pytest.raises((thud.InputError, TypeError), match=naming("impacts")):
             thud.plot.force_history(impacts)  # type: ignore[arg-type]
-    with pytest.raises(thud.InputError, match=naming("ball", 1, "Impact")):
+    with pytest.raises(TypeError, match=naming("ball", "int", "Impact")):
         thud.plot.levels({"ball": 1})  # type: ignore[dict-item]
 
 

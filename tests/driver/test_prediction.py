@@ -532,7 +532,7 @@ def test_source_of_a_room_that_names_none_conforms(run: Run, case_file: CaseFile
     with pytest.raises(thud.InputError, match=naming("floor is missing")):
         thud.predict_level()
     for name in ("floor", "room"):
-        with pytest.raises(thud.InputError, match=naming(name, "array([1., 1.])")):
+        with pytest.raises(TypeError, match=naming(name, "ndarray")):
             thud.predict_level(**{name: np.ones(2)})  # type: ignore[arg-type]
 
 
@@ -560,7 +560,7 @@ def test_reverberation_time_is_one_number_or_a_list() -> None:
         floor=thud.Plate(), room=thud.Room(reverberation_time=(0.9, 0.6, 0.5, 0.4))
     )
     assert octaves.reverberation_time.tolist() == [0.9] * 3 + [0.6] * 3 + [0.5] * 3 + [0.4] * 3
-    with pytest.raises(thud.InputError, match=naming("reverberation_time", "empty")):
+    with pytest.raises(thud.InputError, match=naming("reverberation_time", [])):
         thud.Room(reverberation_time=())
 
 

@@ -6,7 +6,7 @@ Made by ``./bootstrap schema`` from ``thud --schema``; do not edit.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 from thud.base.key import Group, Key, Quantity
@@ -458,20 +458,20 @@ class FiniteElement(Group):
     flight_before: float = 0.0
     flight_after: float = 0.0
     step_safety: float = 0.85
-    radial_elements: int = field(default=0, metadata={"group": "mesh"})
-    polar_elements: int = field(default=0, metadata={"group": "mesh"})
-    law: FiniteElementLaw = field(default="neo_hookean", metadata={"group": "material"})
-    mooney_share: float = field(default=0.2, metadata={"group": "material"})
-    bulk_ratio: float = field(default=200.0, metadata={"group": "material"})
-    viscosity: FiniteElementViscosity = field(default="fractional", metadata={"group": "material"})
-    loss_factor: float | None = field(default=None, metadata={"group": "material"})
-    loss_frequency: float | None = field(default=None, metadata={"group": "material"})
-    fractional_order: float | None = field(default=None, metadata={"group": "material"})
-    prony_share: Sequence[float] = field(default=(), metadata={"group": "material"})
-    prony_time: Sequence[float] = field(default=(), metadata={"group": "material"})
-    friction: float | None = field(default=None, metadata={"group": "contact"})
-    layer_stiffness: float = field(default=0.0, metadata={"group": "contact"})
-    snapshot_interval: float = field(default=0.0, metadata={"group": "output"})
+    radial_elements: int = 0
+    polar_elements: int = 0
+    law: FiniteElementLaw = "neo_hookean"
+    mooney_share: float = 0.2
+    bulk_ratio: float = 200.0
+    viscosity: FiniteElementViscosity = "fractional"
+    loss_factor: float | None = None
+    loss_frequency: float | None = None
+    fractional_order: float | None = None
+    prony_share: Sequence[float] = ()
+    prony_time: Sequence[float] = ()
+    friction: float | None = None
+    layer_stiffness: float = 0.0
+    snapshot_interval: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -1013,12 +1013,20 @@ FLOORS: dict[str, type[FloorOptions]] = {
 }
 
 # Groups that every model uses.
-GROUPS = {
+GROUPS: dict[str, type[Group]] = {
     "ball": Ball,
     "drop": Drop,
     "sampling": Sampling,
     "levels": Levels,
     "limits": Limits,
+}
+
+# Groups that a case may have.
+OPTIONAL_GROUPS: dict[str, type[Group]] = {
+    "modes": Modes,
+    "compression": Compression,
+    "unknowns": Unknowns,
+    "room": Room,
 }
 
 
@@ -1216,11 +1224,11 @@ STANDARD_BALL: dict[tuple[str, str], float] = {
 # Every key, in the order of an input file.
 KEYS = (
     Key("", "case", "name", "text", "", "name of the case and of its output directory"),
-    Key("", "ball", "outer_radius", "real", "m", "outer radius", (), 0.0, 10.0),
-    Key("", "ball", "wall_thickness", "real", "m", "wall thickness, less than the outer radius", (), 0.0, "outer_radius"),
+    Key("", "ball", "outer_radius", "real", "m", "outer radius", (), 0.0, 10.0, lower_open=True),
+    Key("", "ball", "wall_thickness", "real", "m", "wall thickness, less than the outer radius", (), 0.0, "outer_radius", lower_open=True, upper_open=True),
     Key("", "ball", "mass", "real", "kg", "mass", (), 1e-12, 1000000.0),
-    Key("", "ball", "youngs_modulus", "real", "Pa", "modulus of elasticity", (), 0.0, 10000000000000.0),
-    Key("", "ball", "poisson_ratio", "real", "", "Poisson's ratio", (), -1.0, 0.5),
+    Key("", "ball", "youngs_modulus", "real", "Pa", "modulus of elasticity", (), 0.0, 10000000000000.0, lower_open=True),
+    Key("", "ball", "poisson_ratio", "real", "", "Poisson's ratio", (), -1.0, 0.5, lower_open=True),
     Key("", "ball", "gauge_pressure", "real", "Pa", "overpressure of the gas in the undeformed ball", (), 0.0, 100000000.0),
     Key("", "ball", "ambient_pressure", "real", "Pa", "pressure of the air around the ball", (), 0.0, 100000000.0),
     Key("", "ball", "heat_capacity_ratio", "real", "", "ratio of specific heats of the enclosed gas", (), 1.0, 2.0),
@@ -1236,7 +1244,7 @@ KEYS = (
     Key("modal_ball", "modal_ball", "damping_law", "choice", "", "damping law: loss factor as a function of frequency", ('constant', 'rising', 'fractional')),
     Key("modal_ball", "modal_ball", "loss_factor", "real", "", "loss factor, twice the damping ratio", (), 0.0, 1.9, needs=('damping_law', 'rising', 'fractional', 'constant')),
     Key("modal_ball", "modal_ball", "loss_frequency", "real", "Hz", "frequency at which loss_factor (rising, fractional) and the modulus (fractional) apply", (), 0.1, 100000.0, needs=('damping_law', 'rising', 'fractional')),
-    Key("modal_ball", "modal_ball", "fractional_order", "real", "", "order of the derivative, for fractional; 1: as rising", (), 0.0, 1.0, needs=('damping_law', 'fractional')),
+    Key("modal_ball", "modal_ball", "fractional_order", "real", "", "order of the derivative, for fractional; 1: as rising", (), 0.0, 1.0, lower_open=True, needs=('damping_law', 'fractional')),
     Key("modal_ball", "modal_ball", "cavity_gas", "flag", "", "the gas in the cavity resists volume changes"),
     Key("modal_ball", "modal_ball", "contact_gravity", "flag", "", "gravity acts also during the contact"),
     Key("modal_ball", "modal_ball", "floor_friction", "choice", "", "friction of the floor: none or infinite (sticking)", ('none', 'stick')),
@@ -1251,17 +1259,17 @@ KEYS = (
     Key("finite_element", "material", "mooney_share", "real", "", "second-invariant fraction of the shear modulus, for mooney_rivlin", (), 0.0, 1.0, needs=('law', 'mooney_rivlin')),
     Key("finite_element", "material", "bulk_ratio", "real", "", "maximum ratio of bulk to shear modulus; lower if Poisson's ratio implies a lower one", (), 2.0, 100000.0),
     Key("finite_element", "material", "viscosity", "choice", "", "law of viscosity", ('none', 'kelvin_voigt', 'fractional', 'constant_loss', 'prony')),
-    Key("finite_element", "material", "loss_factor", "real", "", "loss factor: at loss_frequency (kelvin_voigt, fractional), or from 10 to 1000 Hz (constant_loss)", (), 0.0, 1.0, needs=('viscosity', 'fractional', 'kelvin_voigt', 'constant_loss')),
+    Key("finite_element", "material", "loss_factor", "real", "", "loss factor: at loss_frequency (kelvin_voigt, fractional), or from 10 to 1000 Hz (constant_loss)", (), 0.0, 1.0, lower_open=True, needs=('viscosity', 'fractional', 'kelvin_voigt', 'constant_loss')),
     Key("finite_element", "material", "loss_frequency", "real", "Hz", "frequency at which the ball's modulus is the storage modulus", (), 1.0, 10000.0, needs=('viscosity', 'fractional', 'kelvin_voigt', 'constant_loss', 'prony')),
-    Key("finite_element", "material", "fractional_order", "real", "", "order of the derivative, for fractional; 1: as kelvin_voigt", (), 0.0, 1.0, needs=('viscosity', 'fractional')),
+    Key("finite_element", "material", "fractional_order", "real", "", "order of the derivative, for fractional; 1: as kelvin_voigt", (), 0.0, 1.0, lower_open=True, needs=('viscosity', 'fractional')),
     Key("finite_element", "material", "prony_share", "list", "", "moduli of the branches divided by the long-term modulus, for prony", (), 0.0, 1000.0, needs=('viscosity', 'prony')),
-    Key("finite_element", "material", "prony_time", "list", "s", "relaxation times of the branches, for prony", (), 0.0, 1000.0, needs=('viscosity', 'prony')),
+    Key("finite_element", "material", "prony_time", "list", "s", "relaxation times of the branches, for prony", (), 0.0, 1000.0, lower_open=True, needs=('viscosity', 'prony')),
     Key("finite_element", "contact", "friction", "real", "", "coefficient of friction between ball and floor", (), 0.0, 100.0),
     Key("finite_element", "contact", "layer_stiffness", "real", "N/m3", "stiffness per area of a thin layer on the floor; 0: hard floor without a layer", (), 0.0, 10000000000000.0),
     Key("finite_element", "output", "snapshot_interval", "real", "s", "time between snapshots of the deformed ball; 0: none", (), 0.0, 10.0),
     Key("hollow_sphere", "hollow_sphere", "momentum_flux", "choice", "", "term for the momentum of wall that enters or leaves the flat cap", ('momentum_balance', 'retarding', 'conservative', 'none')),
     Key("measured_modes", "measured_modes", "frequency", "list", "Hz", "natural frequencies of the ball on the floor", (), 0.001, 1000000.0),
-    Key("measured_modes", "measured_modes", "damping_ratio", "list", "", "damping ratios, one per mode", (), 0.0, 1.0),
+    Key("measured_modes", "measured_modes", "damping_ratio", "list", "", "damping ratios, one per mode", (), 0.0, 1.0, upper_open=True),
     Key("measured_modes", "measured_modes", "effective_mass", "list", "kg", "effective masses, one per mode", (), 1e-12, 1000000.0),
     Key("measured_modes", "measured_modes", "allow_mass_mismatch", "flag", "", "effective masses need not add up to the mass of the ball"),
     Key("hunt_crossley", "hunt_crossley", "stiffness", "real", "", "contact stiffness, N/m^exponent; 0: derived from contact_time", (), 0.0, 1000000000000000.0),
@@ -1269,13 +1277,13 @@ KEYS = (
     Key("hunt_crossley", "hunt_crossley", "exponent", "real", "", "exponent of the deflection in the contact force", (), 1.0, 5.0),
     Key("hunt_crossley", "hunt_crossley", "damping", "real", "s/m", "damping coefficient alpha; 0: derived from restitution", (), 0.0, 100.0),
     Key("hunt_crossley", "hunt_crossley", "restitution", "real", "", "target coefficient of restitution; 0: derived from damping", (), 0.0, 1.0),
-    Key("two_mass", "two_mass", "belt_mass", "real", "kg", "mass of belt and tread, less than the mass of the source", (), 0.0, 1000000.0),
+    Key("two_mass", "two_mass", "belt_mass", "real", "kg", "mass of belt and tread, less than the mass of the source", (), 0.0, 1000000.0, lower_open=True, upper_open=True),
     Key("two_mass", "two_mass", "inflation_pressure", "real", "Pa", "inflation pressure", (), 0.0, 100000000.0),
     Key("two_mass", "two_mass", "contact_width", "real", "m", "contact area divided by deflection of the contact patch", (), 0.0, 100.0),
     Key("two_mass", "two_mass", "carcass_stiffness", "real", "N/m", "force of the carcass divided by its deflection, at 20 mm", (), 0.0, 1000000000000.0),
     Key("two_mass", "two_mass", "carcass_exponent", "real", "", "exponent of the deflection in the force of the carcass", (), 1.5, 5.0),
     Key("two_mass", "two_mass", "contact_damping", "real", "s/m", "damping force of the contact divided by elastic force and velocity", (), 0.0, 100.0),
-    Key("two_mass", "two_mass", "belt_frequency", "real", "Hz", "natural frequency of the belt on the sidewall with fixed rim", (), 0.0, 1000000.0),
+    Key("two_mass", "two_mass", "belt_frequency", "real", "Hz", "natural frequency of the belt on the sidewall with fixed rim", (), 0.0, 1000000.0, lower_open=True),
     Key("two_mass", "two_mass", "belt_damping", "real", "", "damping ratio of the belt on the sidewall with fixed rim", (), 0.0, 10.0),
     Key("", "sampling", "sample_rate", "real", "Hz", "samples per second; from 16000 with finite_element", (), 2000.0, 10000000.0),
     Key("", "sampling", "duration", "real", "s", "duration of the record from first touch", (), 0.001, 10.0),
@@ -1305,13 +1313,13 @@ KEYS = (
     Key("plate", "plate", "loss_factor", "real", "", "internal loss factor of the floor", (), 0.0, 1.0),
     Key("plate", "plate", "edges", "choice", "", "losses at the edges of the floor", ('building', 'laboratory', 'absorption')),
     Key("plate", "plate", "edge_absorption", "real", "m", "sum of edge lengths times absorption coefficients, for absorption", (), 0.0, 1000.0),
-    Key("plate", "plate", "source_x", "real", "", "relative source position along the length; levels in the room are means over positions", (), 0.0, 1.0),
-    Key("plate", "plate", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
+    Key("plate", "plate", "source_x", "real", "", "relative source position along the length; levels in the room are means over positions", (), 0.0, 1.0, lower_open=True, upper_open=True),
+    Key("plate", "plate", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0, lower_open=True, upper_open=True),
     Key("plate", "plate", "support", "choice", "", "support of the edges", ('unknown', 'simple', 'clamped', 'free', 'elastic')),
     Key("plate", "plate", "support_stiffness", "list", "N/m2", "stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length, y at 0 and width)", (), 0.0, 100000000000000.0),
     Key("plate", "plate", "support_rotation", "list", "N", "stiffness of elastic edges against rotation per length: 1 or 4 values", (), 0.0, 100000000000000.0),
-    Key("plate", "plate", "line_x", "list", "m", "positions along the length of walls or beams on which the floor rests", (), 0.0, 100.0),
-    Key("plate", "plate", "line_y", "list", "m", "positions along the width of walls or beams on which the floor rests", (), 0.0, 100.0),
+    Key("plate", "plate", "line_x", "list", "m", "positions along the length of walls or beams on which the floor rests", (), 0.0, 100.0, lower_open=True, upper_open=True),
+    Key("plate", "plate", "line_y", "list", "m", "positions along the width of walls or beams on which the floor rests", (), 0.0, 100.0, lower_open=True, upper_open=True),
     Key("plate", "plate", "screed_thickness", "real", "m", "thickness of a floating plate; 0: none", (), 0.0, 0.5),
     Key("plate", "plate", "screed_density", "real", "kg/m3", "density of the floating plate", (), 10.0, 20000.0),
     Key("plate", "plate", "screed_wave_speed", "real", "m/s", "speed of longitudinal waves in the floating plate", (), 100.0, 10000.0),
@@ -1342,14 +1350,14 @@ KEYS = (
     Key("laminate_floor", "laminate_floor", "torsion_factor", "real", "", "fraction of the torsional stiffness that joints between boards leave", (), 0.0, 1.0),
     Key("laminate_floor", "laminate_floor", "density", "real", "kg/m3", "density of the layers", (), 10.0, 20000.0),
     Key("laminate_floor", "laminate_floor", "added_mass", "real", "kg/m2", "mass without stiffness on the plate, as gravel", (), 0.0, 1000.0),
-    Key("laminate_floor", "laminate_floor", "loss_factor", "real", "", "loss factor of the floor including its edges, without radiation", (), 0.0, 1.0),
-    Key("laminate_floor", "laminate_floor", "source_x", "real", "", "relative source position along the length; levels in the room are means over positions", (), 0.0, 1.0),
-    Key("laminate_floor", "laminate_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
+    Key("laminate_floor", "laminate_floor", "loss_factor", "real", "", "loss factor of the floor including its edges, without radiation", (), 0.0, 1.0, lower_open=True),
+    Key("laminate_floor", "laminate_floor", "source_x", "real", "", "relative source position along the length; levels in the room are means over positions", (), 0.0, 1.0, lower_open=True, upper_open=True),
+    Key("laminate_floor", "laminate_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0, lower_open=True, upper_open=True),
     Key("laminate_floor", "laminate_floor", "support", "choice", "", "support of the edges", ('unknown', 'simple', 'clamped', 'free', 'elastic')),
     Key("laminate_floor", "laminate_floor", "support_stiffness", "list", "N/m2", "stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length, y at 0 and width)", (), 0.0, 100000000000000.0),
     Key("laminate_floor", "laminate_floor", "support_rotation", "list", "N", "stiffness of elastic edges against rotation per length: 1 or 4 values", (), 0.0, 100000000000000.0),
-    Key("laminate_floor", "laminate_floor", "line_x", "list", "m", "positions along the length of walls or beams on which the floor rests", (), 0.0, 100.0),
-    Key("laminate_floor", "laminate_floor", "line_y", "list", "m", "positions along the width of walls or beams on which the floor rests", (), 0.0, 100.0),
+    Key("laminate_floor", "laminate_floor", "line_x", "list", "m", "positions along the length of walls or beams on which the floor rests", (), 0.0, 100.0, lower_open=True, upper_open=True),
+    Key("laminate_floor", "laminate_floor", "line_y", "list", "m", "positions along the width of walls or beams on which the floor rests", (), 0.0, 100.0, lower_open=True, upper_open=True),
     Key("laminate_floor", "laminate_floor", "screed_thickness", "real", "m", "thickness of a floating plate; 0: none", (), 0.0, 0.5),
     Key("laminate_floor", "laminate_floor", "screed_density", "real", "kg/m3", "density of the floating plate", (), 10.0, 20000.0),
     Key("laminate_floor", "laminate_floor", "screed_wave_speed", "real", "m/s", "speed of longitudinal waves in the floating plate", (), 100.0, 10000.0),
@@ -1375,21 +1383,21 @@ KEYS = (
     Key("joist_floor", "joist_floor", "sheathing_thickness", "real", "m", "thickness of the sheathing", (), 0.003, 0.3),
     Key("joist_floor", "joist_floor", "sheathing_density", "real", "kg/m3", "density of the sheathing", (), 10.0, 20000.0),
     Key("joist_floor", "joist_floor", "sheathing_modulus", "real", "Pa", "modulus of elasticity of the sheathing in bending", (), 10000000.0, 1000000000000.0),
-    Key("joist_floor", "joist_floor", "spacing", "real", "m", "distance between the axes of adjacent joists", (), "joist_width", "width"),
+    Key("joist_floor", "joist_floor", "spacing", "real", "m", "distance between the axes of adjacent joists", (), "joist_width", "width", lower_open=True, upper_open=True),
     Key("joist_floor", "joist_floor", "joist_width", "real", "m", "width of a joist", (), 0.005, 1.0),
     Key("joist_floor", "joist_floor", "joist_height", "real", "m", "height of a joist", (), 0.01, 2.0),
     Key("joist_floor", "joist_floor", "joist_density", "real", "kg/m3", "density of the joists", (), 10.0, 20000.0),
     Key("joist_floor", "joist_floor", "joist_modulus", "real", "Pa", "modulus of elasticity of the joists", (), 10000000.0, 1000000000000.0),
     Key("joist_floor", "joist_floor", "connection", "real", "", "composite action of sheathing and joists over the span, 0 (loose) to 1 (glued), EN 1995-1-1 annex B", (), 0.0, 1.0),
-    Key("joist_floor", "joist_floor", "loss_factor", "real", "", "loss factor of the floor including its edges, without radiation", (), 0.0, 1.0),
-    Key("joist_floor", "joist_floor", "source_x", "real", "", "relative source position along the length; levels in the room are means over positions", (), 0.0, 1.0),
-    Key("joist_floor", "joist_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
+    Key("joist_floor", "joist_floor", "loss_factor", "real", "", "loss factor of the floor including its edges, without radiation", (), 0.0, 1.0, lower_open=True),
+    Key("joist_floor", "joist_floor", "source_x", "real", "", "relative source position along the length; levels in the room are means over positions", (), 0.0, 1.0, lower_open=True, upper_open=True),
+    Key("joist_floor", "joist_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0, lower_open=True, upper_open=True),
     Key("joist_floor", "joist_floor", "source_on", "choice", "", "impact location: midway between the next joists, on the next joist, or exactly the position", ('sheathing', 'joist', 'position')),
     Key("joist_floor", "joist_floor", "support", "choice", "", "support of the edges", ('unknown', 'simple', 'clamped', 'free', 'elastic')),
     Key("joist_floor", "joist_floor", "support_stiffness", "list", "N/m2", "stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length, y at 0 and width)", (), 0.0, 100000000000000.0),
     Key("joist_floor", "joist_floor", "support_rotation", "list", "N", "stiffness of elastic edges against rotation per length: 1 or 4 values", (), 0.0, 100000000000000.0),
-    Key("joist_floor", "joist_floor", "line_x", "list", "m", "positions along the length of walls or beams on which the floor rests", (), 0.0, 100.0),
-    Key("joist_floor", "joist_floor", "line_y", "list", "m", "positions along the width of walls or beams on which the floor rests", (), 0.0, 100.0),
+    Key("joist_floor", "joist_floor", "line_x", "list", "m", "positions along the length of walls or beams on which the floor rests", (), 0.0, 100.0, lower_open=True, upper_open=True),
+    Key("joist_floor", "joist_floor", "line_y", "list", "m", "positions along the width of walls or beams on which the floor rests", (), 0.0, 100.0, lower_open=True, upper_open=True),
     Key("joist_floor", "joist_floor", "screed_thickness", "real", "m", "thickness of a floating plate; 0: none", (), 0.0, 0.5),
     Key("joist_floor", "joist_floor", "screed_density", "real", "kg/m3", "density of the floating plate", (), 10.0, 20000.0),
     Key("joist_floor", "joist_floor", "screed_wave_speed", "real", "m/s", "speed of longitudinal waves in the floating plate", (), 100.0, 10000.0),
@@ -1414,8 +1422,8 @@ KEYS = (
     Key("measured_mobility", "measured_mobility", "damping_ratio", "list", "", "damping ratios of the poles; 1 for a real pole", (), 1e-12, 1.0),
     Key("measured_mobility", "measured_mobility", "residue_real", "list", "m/(N s2)", "real parts of the residues, doubled for a pair of poles", (), -1000000000000.0, 1000000000000.0),
     Key("measured_mobility", "measured_mobility", "residue_imaginary", "list", "m/(N s2)", "imaginary parts of the residues, doubled for a pair of poles", (), -1000000000000.0, 1000000000000.0),
-    Key("measured_mobility", "measured_mobility", "lowest_frequency", "real", "Hz", "lowest frequency of the measurement", (), 0.0, "highest_frequency"),
-    Key("measured_mobility", "measured_mobility", "highest_frequency", "real", "Hz", "highest frequency of the measurement", (), 0.0, 10000000.0),
+    Key("measured_mobility", "measured_mobility", "lowest_frequency", "real", "Hz", "lowest frequency of the measurement", (), 0.0, "highest_frequency", lower_open=True, upper_open=True),
+    Key("measured_mobility", "measured_mobility", "highest_frequency", "real", "Hz", "highest frequency of the measurement", (), 0.0, 10000000.0, lower_open=True),
     Key("measured_mobility", "measured_mobility", "length", "real", "m", "length of the floor", (), 0.5, 100.0),
     Key("measured_mobility", "measured_mobility", "width", "real", "m", "width of the floor", (), 0.5, 100.0),
     Key("measured_mobility", "measured_mobility", "thickness", "real", "m", "thickness of the plate that radiates into a room; 0: none", (), 0.0, 2.0),
@@ -1427,8 +1435,8 @@ KEYS = (
     Key("measured_mobility", "measured_mobility", "edges", "choice", "", "losses at the edges of the floor", ('building', 'laboratory', 'absorption')),
     Key("measured_mobility", "measured_mobility", "edge_absorption", "real", "m", "sum of edge lengths times absorption coefficients, for absorption", (), 0.0, 1000.0),
     Key("modal_floor", "modal_floor", "file", "text", "", "file of the modes: frequencies, loss factors, shapes on a grid"),
-    Key("modal_floor", "modal_floor", "source_x", "real", "", "relative source position along the length; levels in the room are means over positions", (), 0.0, 1.0),
-    Key("modal_floor", "modal_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0),
+    Key("modal_floor", "modal_floor", "source_x", "real", "", "relative source position along the length; levels in the room are means over positions", (), 0.0, 1.0, lower_open=True, upper_open=True),
+    Key("modal_floor", "modal_floor", "source_y", "real", "", "relative source position along the width", (), 0.0, 1.0, lower_open=True, upper_open=True),
     Key("modal_floor", "modal_floor", "residual_compliance", "real", "m/N", "static compliance at the source of the modes above those of the file; 0: that of the plate", (), 0.0, 1.0),
     Key("modal_floor", "modal_floor", "thickness", "real", "m", "thickness of the plate that radiates into a room; 0: none", (), 0.0, 2.0),
     Key("modal_floor", "modal_floor", "density", "real", "kg/m3", "density of the floor", (), 10.0, 20000.0),
@@ -1456,10 +1464,13 @@ KEYS = (
     Key("room", "room", "ceiling_mass", "real", "kg/m2", "mass per unit area of a suspended ceiling; 0: none", (), 0.0, 200.0),
     Key("room", "room", "ceiling_depth", "real", "m", "depth of the air cavity above the ceiling", (), 0.01, 2.0),
     Key("room", "room", "ceiling_loss_factor", "real", "", "loss factor of the ceiling cavity", (), 0.001, 1.0),
-    Key("room", "room", "corner_x", "real", "m", "position of the room along the length of a larger floor", (), 0.0, 100.0),
-    Key("room", "room", "corner_y", "real", "m", "position of the room along the width of a larger floor", (), 0.0, 100.0),
+    Key("room", "room", "corner_x", "real", "m", "position of the room along the length of a larger floor", (), 0.0, 100.0, upper_open=True),
+    Key("room", "room", "corner_y", "real", "m", "position of the room along the width of a larger floor", (), 0.0, 100.0, upper_open=True),
     Key("room", "room", "radiation", "choice", "", "radiation factor of the floor, by its modes or by ISO 12354-1", ('modes', 'iso_12354')),
     Key("room", "room", "positions", "choice", "", "positions of ball and microphone: those of the rating, 5 standard ones each (octaves), or 16 even ones each", ('rating', 'standard', 'even')),
     Key("room", "room", "rating", "choice", "", "rating that is asked for (KS F ISO 717-2, ISO 717-2, ISO 16283-2)", ('octaves', 'thirds', 'standardized')),
     Key("room", "room", "required", "real", "dB", "maximum of that rating that is required; 0: none", (), 0.0, 200.0),
 )
+_CLASSES = {**GROUPS, **OPTIONAL_GROUPS, **MODELS, **FLOORS}
+for _name, _class in _CLASSES.items():
+    _class.keys = {key.name: key for key in KEYS if (key.owner or key.group) == _name}

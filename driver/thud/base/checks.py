@@ -38,33 +38,32 @@ def refuse(  # noqa: PLR0913 - the fields of a note
     value: object = None,
     low: float = math.nan,
     high: float = math.nan,
+    **others: float | str,
 ) -> NoReturn:
     """Raise InputError with a message: the name of an argument or key, its problem, the mend.
 
     `cause` is the exception that shows the problem, `subject` the key that would mend it, by
-    default that of the name; `value`, `low` and `high` are a number and its range.
+    default that of the name; `value`, `low` and `high` are a number and its range, `others` further
+    values of the note.
     """
-    text = f"{problem}; allowed: {allowed}"
-    number = float(value) if isinstance(value, int | float) and not math.isnan(low) else math.nan
-    note = Note("refused", subject or name, number, low, high, others={"name": name, "text": text})
+    others |= {"name": name, "text": f"{problem}; allowed: {allowed}"}
+    is_number = isinstance(value, int | float) and not math.isnan(low) and abs(value) <= MAX_NUMBER
+    number = float(value) if is_number else math.nan  # type: ignore[arg-type]
+    note = Note("refused", subject or name, number, low, high, others=others)
     raise InputError(str(note).lstrip(), note) from cause
 
 
-def refuse_value(
-    name: str, value: object, allowed: str, *, low: float = math.nan, high: float = math.nan
-) -> NoReturn:
+def refuse_value(name: str, value: object, allowed: str, **more: Any) -> NoReturn:  # noqa: ANN401
     """Raise InputError for a value that is not allowed, or not within a range; see `refuse`."""
-    problem = f"= {shown(value)} is not allowed"
-    refuse(problem, allowed, name=name, value=value, low=low, high=high)
+    refuse(f"= {shown(value)} is not allowed", allowed, name=name, value=value, **more)
 
 
 def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
-    """Raise InputError if an argument is not of a type."""
+    """Raise TypeError if an argument is not of a type."""
     if not isinstance(value, kind):
-        expected = getattr(kind, "__name__", None) or " or ".join(
-            k.__name__ for k in get_args(kind)
-        )
-        refuse_value(name, value, f"an object of {expected}")
+        expected = " or ".join(entry.__name__ for entry in get_args(kind) or (kind,))
+        message = f"{name} must be an object of {expected}, not {type(value).__name__}"
+        raise TypeError(message)
 
 
 def require_choice(name: str, value: object, allowed: Collection[str]) -> str:

@@ -14,6 +14,7 @@ from thud.base._schema import (
     GROUPS,
     KEYS,
     MODELS,
+    OPTIONAL_GROUPS,
     STANDARD_BALL,
     Ball,
     Compression,
@@ -30,10 +31,8 @@ from thud.base._schema import (
 )
 from thud.base.bridge import ask
 from thud.base.checks import (
-    MAX_NUMBER,
     refuse,
     refuse_unknown,
-    refuse_value,
     require_choice,
     require_kind,
     shown,
@@ -41,6 +40,7 @@ from thud.base.checks import (
 )
 from thud.base.display import Displayed
 from thud.base.files import replace_file
+from thud.base.immutable import plain
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -54,10 +54,6 @@ Namelist: TypeAlias = "Mapping[str, Mapping[str, object]]"
 _NAMES: dict[str, list[str]] = {}
 for _key in KEYS:
     _NAMES.setdefault(_key.group, []).append(_key.name)
-# Groups that a case may have.
-OPTIONAL_GROUPS: dict[str, type[Group]] = {
-    "modes": Modes, "compression": Compression, "unknowns": Unknowns, "room": Room,
-}  # fmt: skip
 
 
 def attribute_of(key: Key) -> str:
@@ -129,8 +125,9 @@ class Case(Displayed):
     unknowns: Unknowns | None = None
 
     def __post_init__(self) -> None:
-        """Raise InputError if a group is of a wrong type."""
+        """Raise TypeError if a group is of a wrong type."""
         super().__post_init__()
+        KEYS[0].require(self.name)
         chosen = {"model": ModelOptions, "floor": FloorOptions}
         kinds: dict[str, Any] = {**GROUPS, **chosen, **OPTIONAL_GROUPS}
         for group, kind in kinds.items():
@@ -181,28 +178,12 @@ class Case(Displayed):
         """Return the case as a namelist, which prints as the text of a file.
 
         It has every key but those of the standard ball that are None.
-
-        Raise InputError if a value is not a number, a text or, if the key takes a list, a list of
-        numbers.
         """
         groups: dict[str, dict[str, object]] = {}
-        for key, value, standard in ((KEYS[0], self.name, None), *self.entries()):
-            if standard is not None:
-                continue
-            is_list = isinstance(value, tuple)
-            entries = [*value] if isinstance(value, tuple) else [value]
-            # What f90nml can write.
-            are_plain = (
-                isinstance(entry, float)
-                or (isinstance(entry, int) and abs(entry) <= MAX_NUMBER)
-                or (isinstance(entry, str) and entry.isprintable())
-                for entry in entries
-            )
-            if not all(are_plain) or is_list is not (key.kind in {"list", "texts"}):
-                refuse_value(f"&{key.group}: {key.name}", value, "a number or plain text")
+        for key, value, _ in ((KEYS[0], self.name, None), *self.entries()):
             group = groups.setdefault(key.group, {})
-            if entries:
-                group[key.name] = entries if is_list else value
+            if value is not None and value != ():
+                group[key.name] = [*value] if isinstance(value, tuple) else value
         namelist: Any = f90nml.Namelist()  # a dictionary of groups would be sorted
         namelist.update(groups)
         return namelist  # type: ignore[no-any-return]
@@ -217,7 +198,7 @@ class Case(Displayed):
         """Return the case in a namelist, or other tables of keys by group.
 
         Missing keys have their default. Raise InputError if a group, a key, or the name of model
-        or floor is not known, or a group is not a table; `check_case` checks the values.
+        or floor is not known, a group is not a table, or a value is not allowed.
         """
         content: dict[str, Any] = dict(namelist)
         refuse_unknown("the case", content, _NAMES)
@@ -234,10 +215,11 @@ class Case(Displayed):
                 kinds[group] = choices[name]
         attributes: dict[str, Any] = {"model": None, **content.get("case", {})}
         for attribute, kind in kinds.items():
-            own = getattr(kind, "name", attribute)
-            keys = {e.name: e.metadata.get("group", own) for e in fields(kind)}  # type: ignore[arg-type]
-            stated = {k: content[g][k] for k, g in keys.items() if k in content.get(g, {})}
-            attributes[attribute] = kind(**stated)
+            keys = [key for key in kind.keys.values() if key.name in content.get(key.group, {})]
+            values = {key.name: plain(content[key.group][key.name]) for key in keys}
+            for name, value in values.items():
+                kind.keys[name].require(value)
+            attributes[attribute] = kind(**values)
         return cls(**attributes)
 
 

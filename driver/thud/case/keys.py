@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from thud.base._schema import GROUPS, KEYS
 from thud.base.checks import refuse, shown, suggestion
+from thud.base.immutable import plain
 from thud.base.key import Key
 from thud.case.case import attribute_of
 
@@ -86,6 +87,7 @@ def with_values(case: Case, values: Mapping[str, object]) -> Case:
         key, entry = find_key(name, case)
         group = attribute_of(key)
         changes = groups.setdefault(group, {})
+        key.require(plain(value))
         if entry is None:
             changes[key.name] = value
         else:
@@ -120,8 +122,8 @@ def humanize(name: str) -> str:
     >>> humanize("youngs_modulus")
     "Young's modulus"
     """
-    for plain, proper in _PROPER.items():
-        name = re.sub(rf"(?<![^\W_]){plain}(?![^\W_])", proper, name)
+    for key, proper in _PROPER.items():
+        name = re.sub(rf"(?<![^\W_]){key}(?![^\W_])", proper, name)
     return name.replace("_", " ")
 
 

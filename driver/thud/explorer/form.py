@@ -9,9 +9,8 @@ from dataclasses import fields
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS, RATINGS, STANDARD_BALL
+from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS, OPTIONAL_GROUPS, RATINGS, STANDARD_BALL
 from thud.base.units import display_unit, power_of, scaled
-from thud.case.case import OPTIONAL_GROUPS
 from thud.case.constructions import constructions
 from thud.case.keys import humanize
 from thud.explorer.models import condition_of, is_folded, users_of
