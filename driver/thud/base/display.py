@@ -13,18 +13,23 @@ import numpy as np
 
 from thud.base.errors import ReportWarning
 from thud.base.extras import data_frame, require_extra
+from thud.base.files import replace_file
 from thud.base.immutable import Immutable
 from thud.base.tables import csv_text
 
 if TYPE_CHECKING:
+    import os
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     import pandas as pd
     import xarray as xr
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
+
+    from thud.base.note import Note
 
     # Values of a column, shape (n_row,), and their format; by title with unit, such as "level, dB".
-    Columns = Mapping[str, tuple[Iterable[float], str]]
+    Columns = Mapping[str, tuple[Iterable[Any], str]]
 
 _SYMBOL = re.compile(r"\b([CL])_(FE|I|iA,Fmax|n,w)\b")
 # Maximum length of a cause in a warning.
@@ -32,7 +37,7 @@ _MAX_CAUSE = 100
 
 
 class Displayed(Immutable, ABC):
-    """Base of results; their HTML is their text above a table."""
+    """Base of results: one line, and a table of texts; HTML has both."""
 
     @abstractmethod
     def rows(self) -> Sequence[Sequence[str]]:
@@ -43,11 +48,16 @@ class Displayed(Immutable, ABC):
 
 
 class Tabulated(Displayed):
-    """Base of results that are a table: all its forms follow from `columns`."""
+    """Base of results that are a table of values: all its forms follow from `columns`."""
 
     @abstractmethod
     def columns(self) -> Columns:
-        """Return values, shape (n_row,), and their format by titles with units."""
+        """Return numbers or texts, shape (n_row,), and their format by titles with units."""
+
+    @property
+    def notes(self) -> tuple[Note, ...]:
+        """Facts that a user of the result should know."""
+        return ()
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text; the text of NaN is empty."""
@@ -68,20 +78,22 @@ class Tabulated(Displayed):
         with require_extra("studies"):
             import xarray as xr
 
-        variables: dict[str, Any] = {}
-        for title, (values, _) in self.columns().items():
-            name, _, unit = title.replace(" ", "_").partition(",_")
-            axis = next(iter(variables), name)
-            variables[name] = (axis, np.asarray(values), {"units": unit.replace("_", " ") or "1"})
-        return xr.Dataset(variables)
+        units = [title.partition(", ")[2] or "1" for title in self.columns()]
+        names = [title.partition(", ")[0].replace(" ", "_") for title in self.columns()]
+        columns = zip(names, units, self._named().values(), strict=True)
+        return xr.Dataset({n: (names[0], v, {"units": unit}) for n, unit, v in columns})
 
     def to_csv(self) -> str:
         """Return the table of `to_dataframe` as text, with ten digits."""
-        named = self._named()
-        rows = zip(*named.values(), strict=True)
-        return csv_text([[*named], *([f"{value:.10g}" for value in row] for row in rows)])
+        rows = zip(*(values.tolist() for values in self._named().values()), strict=True)
+        texts = ([f"{v:.10g}" if isinstance(v, float) else v for v in row] for row in rows)
+        return csv_text([[*self._named()], *texts])
 
-    def _named(self) -> dict[str, Any]:
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write `to_csv` to a file, which is replaced as a whole; an OSError names its path."""
+        replace_file(path, self.to_csv().encode())
+
+    def _named(self) -> dict[str, NDArray[Any]]:
         """Return the values by names of variables, which end with units."""
         return {
             title.replace(", ", "_").replace("/", "_per_").replace(" ", "_"): np.asarray(values)
@@ -91,10 +103,8 @@ class Tabulated(Displayed):
 
 def column_rows(columns: Columns) -> list[tuple[str, ...]]:
     """Return header and rows of text of `Tabulated.columns`."""
-    cells = [
-        ["" if np.isnan(value) else f"{value:{form}}" for value in values]
-        for values, form in columns.values()
-    ]
+    # NaN alone differs from itself.
+    cells = [["" if v != v else f"{v:{form}}" for v in values] for values, form in columns.values()]  # noqa: PLR0124
     return [tuple(columns), *zip(*cells, strict=True)]
 
 

@@ -44,7 +44,13 @@ PROCESSING = {
     "below {fraction:g} of the highest; choose its number (--drops, drops) if it is a drop",
     "bounce_ignored": "a bounce of an earlier drop at {time:.2f} s is no drop and has no number",
     "pulse_ignored": "a pulse of {value:.0f} N at {time:.2f} s is no drop and has no number",
-    # Samples.
+    # Samples, and drops over what is not known of a source.
+    "drops_varied": "{drops:g} drops, {lost:g} without results; range: minimum and maximum, "
+    "without numerical error; probability: Wilson interval (95 %); not known: {names}",
+    "unknown_range": "{low:g} to {high:g} {unit} ({reason})",
+    "keys_fixed": "fixed by the case: {names}",
+    "conforms_by_calibration": "that the standard ball conforms is put in by the calibration, not "
+    "found",
     "no_numerical_errors": "The samples state no numerical errors; a run of a single case states "
     "its own.",
 }

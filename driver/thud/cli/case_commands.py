@@ -141,7 +141,7 @@ def assess_case(options: argparse.Namespace) -> int:
     results = results_of(options, f"{case.name}_verdict", (options.case,), case.name)
     results.require()
     verdict = assess(case, progress=shows_progress(quiet=options.quiet))
-    shown = "\n".join([format_rows(verdict.rows()), *verdict.notes])
+    shown = "\n".join([format_rows(verdict.rows()), *(note.message for note in verdict.notes)])
     contents = {"verdict.csv": verdict.to_csv().encode()}
     return finish(options, results, contents, shown, verdict=verdict)
 

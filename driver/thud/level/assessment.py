@@ -20,17 +20,21 @@ from thud.base.checks import (
     require_number,
     require_pair,
 )
-from thud.base.display import Displayed
+from thud.base.display import Displayed, Tabulated
 from thud.base.immutable import Immutable
 from thud.base.key import Quantity
-from thud.base.tables import Result, csv_text
+from thud.base.tables import Result
 from thud.level.estimate import NORMAL_FACTOR, NUMERICAL_ERROR, Estimate
 from thud.level.levels import BANDWIDTHS, SOURCES, get_bands
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.base._schema import LimitsSource
+    from thud.base.display import Columns
+    from thud.base.note import Note
 
 _BISECTIONS = 40
 
@@ -234,7 +238,7 @@ class Criterion(Outcome):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Verdict(Outcome, Displayed):
+class Verdict(Outcome, Tabulated):
     """Result of an assessment.
 
     Attributes
@@ -248,7 +252,7 @@ class Verdict(Outcome, Displayed):
         source; None: one source.
     unknowns, fixed : tuple of str
         Keys that differ among the drops, and keys of the calibrated set that the case fixes.
-    notes : tuple of str
+    notes : tuple of Note
         How the drops were made.
     """
 
@@ -257,7 +261,7 @@ class Verdict(Outcome, Displayed):
     counts: tuple[int, int] | None = None
     unknowns: tuple[str, ...] = ()
     fixed: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    notes: tuple[Note, ...] = ()
 
     def _of_one_source(self) -> str:
         """Return that any criterion fails, else that any is undecided, else that all conform."""
@@ -284,21 +288,30 @@ class Verdict(Outcome, Displayed):
         rows = [criterion.cells() for criterion in self.criteria]
         return [header, *rows, (*last, Result(self.conforms, self.conforms))]
 
-    def to_csv(self) -> str:
-        """Return the criteria as CSV, SI units, levels in dB; the last row is that of all."""
-        columns = (
-            "criterion", "unit", "value", "low", "high", "lower_limit", "upper_limit",
-            "probability_low", "probability_high", "main_unknown", "result",
-        )  # fmt: skip
-        rows = [
+    def columns(self) -> Columns:
+        """Return the criteria in SI units, levels in dB; the last row is that of all."""
+        none = math.nan, math.nan
+        rows: list[tuple[float | str, ...]] = [
             (
-                c.name, c.unit, c.value, *(c.range or ("", "")), c.lower, c.upper,
-                *(c.interval or ("", "")), c.main_unknown, c.conforms,
+                c.name, c.unit, c.value, *(c.range or none), c.lower, c.upper,
+                *(c.interval or none), c.main_unknown, c.conforms,
             )
             for c in self.criteria
         ]  # fmt: skip
-        ends = self.interval or ("", "")
-        return csv_text([columns, *rows, ("all", *("",) * 6, *ends, "", self.conforms)])
+        total = ("all", "", math.nan, *none, *none, *(self.interval or none), "", self.conforms)
+        titles = {
+            "criterion": "", "unit": "", "value": "g", "low": "g", "high": "g", "lower limit": "g",
+            "upper limit": "g", "probability low": "g", "probability high": "g",
+            "main unknown": "", "result": "",
+        }  # fmt: skip
+        columns = zip(titles.items(), *rows, total, strict=True)
+        return {title: (values, form) for (title, form), *values in columns}
+
+    def plot(self, ax: Axes | None = None) -> Figure | Axes:
+        """Draw each criterion in its range; return the figure, or the axes that it is drawn on."""
+        from thud.plot.verdict_figure import draw_verdict
+
+        return draw_verdict(self, ax)
 
 
 class ImpactOrRecording(Displayed):

@@ -12,6 +12,7 @@ import numpy as np
 
 from thud.base._schema import STANDARD_BALL, FiniteElement, ModalBall
 from thud.base.checks import refuse, require_kind
+from thud.base.note import Note
 from thud.case.case import Case, check_case
 from thud.case.keys import find_key, value_in, with_values
 from thud.impact.compute import compute
@@ -41,7 +42,6 @@ SAMPLES = 256
 _SEED = 0
 # Maximum fraction of drops without results.
 _MAX_FAILED = 0.1
-_CALIBRATION = "that the standard ball conforms is put in by the calibration, not found"
 # Relative differences of values that do not vary.
 _ROUNDING = 1e-9
 
@@ -115,15 +115,14 @@ def assess(case: Case | Impact, *, progress: bool = False) -> Verdict:
     values = _criteria(case, columns, progress=progress)
     failed = np.isnan(values).any(axis=1)
     columns = {key: column[~failed] for key, column in columns.items()}
-    lost = f"; {failed.sum()} have no result" if failed.any() else ""
+    drop = compute(with_values(alone, {key: float(x[0]) for key, x in columns.items()}))
+    counts = {"drops": len(values) - 1.0, "lost": float(failed.sum())}
     notes = (
-        f"{len(values) - 1} drops{lost}; range: minimum and maximum, without numerical error",
-        "probability: Wilson interval (95 %)",
-        f"not known: {', '.join(columns)}",
-        *map(str, stated),
-        *compute(with_values(alone, {key: float(x[0]) for key, x in columns.items()})).warnings,
-        *([f"fixed by the case: {', '.join(fixed)}"] if fixed else []),
-        *([_CALIBRATION] if sets else []),
+        Note("drops_varied", others={"names": ", ".join(columns), **counts}),
+        *(unknown.note for unknown in stated),
+        *drop.notes,
+        *([Note("keys_fixed", others={"names": ", ".join(fixed)})] if fixed else []),
+        *([Note("conforms_by_calibration")] if sets else []),
     )
     return _verdict(case, columns, values[~failed], fixed, notes)
 
@@ -192,7 +191,7 @@ def _criteria(case: Case, columns: Columns, *, progress: bool) -> Values:
 
 
 def _verdict(
-    case: Case, columns: Columns, values: Values, fixed: tuple[str, ...], notes: tuple[str, ...]
+    case: Case, columns: Columns, values: Values, fixed: tuple[str, ...], notes: tuple[Note, ...]
 ) -> Verdict:
     """Return the verdict by the criteria of drops, of which the first is that of the case."""
     first, drops = values[0].tolist(), values[1:]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from thud.base._schema import KEYS, FiniteElement
 from thud.base.checks import refuse
+from thud.base.note import Note
 from thud.base.units import display_unit
 from thud.case.case import impact_only
 
@@ -46,12 +48,13 @@ class Unknown:
     standard_deviation: float
     reason: str
 
-    def __str__(self) -> str:
-        """Return the range and its reason."""
+    @property
+    def note(self) -> Note:
+        """Range and reason."""
         unit = next((key.unit for key in KEYS if key.name == self.key), "")
         unit, size = display_unit(unit, max(abs(self.low), abs(self.high)))
-        ends = f"{self.low / size:g} to {self.high / size:g} {unit}".rstrip()
-        return f"{self.key} {ends}: {self.reason}"
+        low, high = self.low / size, self.high / size
+        return Note("unknown_range", self.key, math.nan, low, high, unit, {"reason": self.reason})
 
     def quantiles(self, fraction: NDArray[np.float64], value: float) -> NDArray[np.float64]:
         """Return the values below which fractions of all values lie; `value` is of the case."""
