@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from thud.base._schema import FLOORS, KEYS, FloorOptions, JoistFloor, RectangularFloor, Room
+from thud.base._schema import FLOORS, FloorOptions, JoistFloor, RectangularFloor, Room
 from thud.base.checks import (
     refuse,
     refuse_unknown,
@@ -40,33 +40,18 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 # Keys of the room that belong to a construction: its suspended ceiling.
-CEILING_KEYS = tuple(k.name for k in KEYS if k.owner == "room" and k.name.startswith("ceiling_"))
-_UNITS = {(k.owner, k.name): k.unit for k in KEYS}
+CEILING_KEYS = tuple(name for name in Room.keys if name.startswith("ceiling_"))
 
 
 @dataclass(frozen=True)
 class Layer(TomlTable):
-    """A layer of a floor, with width and spacing of members such as joists; 0: none.
-
-    Values of a file are checked; a layer that is only drawn may have no density.
-    """
+    """A layer of a floor, with width and spacing of members such as joists; 0: none."""
 
     material: str = key(to_text, "name of the material", "")
-    thickness: float = key(between(1e-5, 10.0, "m"), "thickness", 0.0)
+    thickness: float = key(between(1e-9, 10.0, "m"), "thickness", 0.0)
     density: float = key(between(0.1, 1e5, "kg/m3"), "mean density", 0.0)
-    width: float = key(between(1e-3, 10.0, "m"), "width of members such as joists", 0.0)
-    spacing: float = key(between(1e-2, 10.0, "m"), "distance between their axes", 0.0)
-
-    def __post_init__(self) -> None:
-        """Take any values: those of a floor that is drawn are in its own ranges."""
-
-    @classmethod
-    def read(cls, name: str, value: object) -> Layer:
-        """Return the layer of a table; raise InputError if a value is not allowed or missing."""
-        layer = super().read(name, value)
-        TomlTable.__post_init__(layer)
-        layer.require("material", "thickness", "density")
-        return layer
+    width: float = key(between(1e-3, 1e3, "m"), "width of members such as joists", 0.0)
+    spacing: float = key(between(1e-3, 1e3, "m"), "distance between their axes", 0.0)
 
     def __str__(self) -> str:
         """Return thickness and material."""
@@ -161,11 +146,13 @@ class Construction(Displayed):
         """Return header and a row of text for each stated key."""
         rows: list[tuple[str, ...]] = [("key", "value", "unit", "source")]
         for name, source in self.sources.items():
-            owner = "room" if name in self.room else self.floor.name
-            value = self.room[name] if name in self.room else getattr(self.floor, name)
+            in_room = name in self.room
+            value = self.room[name] if in_room else getattr(self.floor, name)
             values = value if isinstance(value, tuple) else (value,)
             text = ", ".join(f"{v:g}" if isinstance(v, float) else str(v) for v in values)
-            rows.append((name, text, _UNITS[owner, name], source))
+            rows.append(
+                (name, text, (Room if name in self.room else self.floor).keys[name].unit, source)
+            )
         return rows
 
     def plot(self) -> Figure:
@@ -179,7 +166,15 @@ class Construction(Displayed):
         return f"<Construction {self.name}: {self.section}>"
 
 
-def constructions(text: str = "") -> dict[str, Construction]:
+class Library(dict[str, Construction]):
+    """Constructions by name; an entry is contained as its name is."""
+
+    def __contains__(self, entry: object) -> bool:
+        """Whether a construction, or one of this name, is in the library."""
+        return super().__contains__(getattr(entry, "name", entry))
+
+
+def constructions(text: str = "") -> Library:
     """Return the floor constructions of the library by name, sorted by kind and name.
 
     Parameters
@@ -199,14 +194,14 @@ def constructions(text: str = "") -> dict[str, Construction]:
     >>> list(thud.constructions("screed 200 15"))
     ['concrete 200, screed on 15 MN/m3', 'hollow core 200, screed on 15 MN/m3']
     """
-    require_kind("text", text, str)
-    chosen = {}
-    for entry in _library():
-        searched = _plain(" ".join((entry.name, entry.kind, *(e.material for e in entry.layers))))
-        if all(word in searched for word in _plain(text).split()):
+    words = _plain(text).split()
+    chosen = Library()
+    for entry in _library().values():
+        materials = (layer.material for layer in entry.layers)
+        if all(word in _plain(" ".join((entry.name, entry.kind, *materials))) for word in words):
             chosen[entry.name] = deepcopy(entry)
     if not chosen:
-        kinds = ", ".join(dict.fromkeys(entry.kind for entry in _library()))
+        kinds = ", ".join(dict.fromkeys(entry.kind for entry in _library().values()))
         refuse(f"no construction contains {shown(text)}", f"words such as those of {kinds}")
     return chosen
 
@@ -234,10 +229,9 @@ def construction(name: str | os.PathLike[str]) -> Construction:
     require_kind("construction", name, str | os.PathLike)
     if not isinstance(name, str) or name.endswith(".toml"):
         return read_construction(Path(name))
-    for entry in _library():
-        if _plain(entry.name) == _plain(name):
-            return deepcopy(entry)
-    hint = suggestion(name, [entry.name for entry in _library()])
+    if entry := _library().get(_plain(name)):
+        return deepcopy(entry)
+    hint = suggestion(name, [entry.name for entry in _library().values()])
     return refuse(
         f"construction = {shown(name)} is not known{hint}",
         "names that thud-driver floor --list shows, or the path of a TOML file",
@@ -258,18 +252,13 @@ def with_floor(case: Case, floor: FloorOptions | Construction | str | None) -> C
 
 
 @cache
-def _library() -> tuple[Construction, ...]:
-    """Return all constructions, sorted by kind, and by the words and numbers of their names."""
+def _library() -> dict[str, Construction]:
+    """Return all constructions by `_plain` name, sorted by kind, words and numbers of the names."""
     entries = map(read_construction, (inputs_folder() / "constructions").glob("*.toml"))
     # Numbers, of four digits, are sorted by their value, and after words.
-    return tuple(
-        sorted(
-            entries,
-            key=lambda entry: (
-                entry.kind, re.sub(r"\d+", lambda n: f"~{n[0]:0>4}", _plain(entry.name)),
-            ),
-        )
-    )  # fmt: skip
+    named = {re.sub(r"\d+", lambda n: f"~{n[0]:0>4}", _plain(e.name)): e for e in entries}
+    ordered = sorted(named.items(), key=lambda entry: (entry[1].kind, entry[0]))
+    return {_plain(entry.name): entry for _, entry in ordered}
 
 
 def _plain(text: str) -> str:
@@ -303,10 +292,11 @@ def _to_layers(name: str, value: object) -> tuple[Layer, ...]:
         refuse_value(name, value, "a list of tables with material, thickness and density")
     layers = []
     for i, table in enumerate(value, 1):
-        label = f"layer {i}"
         try:
             layers.append(Layer.read("the table", table))
+            layers[-1].require("material", "thickness", "density")
         except InputError as error:
+            label = f"layer {i}"
             raise error.within(label) from error
     return tuple(layers)
 
@@ -323,12 +313,6 @@ class _File(TomlTable):
     room: dict[str, Any] = key(_to_sourced, "keys of the suspended ceiling", {})
     note: str = key(to_line, "what the floor neglects", "")
 
-    def __post_init__(self) -> None:
-        """Raise InputError if a value is not allowed or missing."""
-        super().__post_init__()
-        self.require("name", "kind", "floor", "layers")
-        refuse_unknown("[room]", self.room, CEILING_KEYS)
-
 
 def read_construction(path: Path) -> Construction:
     """Read a construction from a TOML file.
@@ -338,9 +322,11 @@ def read_construction(path: Path) -> Construction:
     content, _ = read_toml(path)
     try:
         file = _File.read("the construction", content)
-        room, floor = (
+        file.require("name", "kind", "floor", "layers")
+        refuse_unknown("[room]", file.room, CEILING_KEYS)
+        floor, room = (
             {name: entry["value"] for name, entry in table.items()}
-            for table in (file.room, file.keys)
+            for table in (file.keys, file.room)
         )
         case = Case.from_namelist({"floor": {"name": file.floor}, file.floor: floor, "room": room})
         check_case(case if room else replace(case, room=None))
