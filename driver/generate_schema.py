@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from thud.base.key import Group, Key, Quantity
 
@@ -62,14 +62,6 @@ OF_CASE = '''
 def solve(ball: Case) -> Impact:
     """Compute the impact of a case."""
 '''
-# What a class has beside its keys.
-STANDARD_BALL = '''
-    @classmethod
-    def standard(cls) -> Self:
-        """Return the standard rubber ball, which is also the default."""
-        return cls()
-'''
-EXTRAS = {"ball": STANDARD_BALL}
 # Base of the floors of rectangular plates, named like a group.
 RECTANGULAR = "rectangular_floor"
 # Groups that a case may ask for.
@@ -84,9 +76,9 @@ USERS = {
     "modes": "free modes",
     "compression": "a quasi-static compression",
     "unknowns": "`thud-driver assess`",
+    "floor": "drops on a floor",
+    "room": "the level in the room below",
 }
-USERS["floor"] = "drops on a floor"
-USERS["room"] = "the level in the room below"
 INDENT = " " * 8
 LONGEST = 100
 PAGE = """# Keys of an input file
@@ -176,7 +168,7 @@ def python_class(
     if not keys:
         return "\n".join([f'{head}"""', "", *members, ""])
     attributes = ["\n    Attributes", "    ----------", *attributes, '    """\n']
-    return "\n".join([head, *attributes, *members, EXTRAS.get(group, "")])
+    return "\n".join([head, *attributes, *members, ""])
 
 
 def shared_groups(schema: Entry) -> list[str]:

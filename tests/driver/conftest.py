@@ -136,7 +136,7 @@ def shell() -> thud.Impact:
 def flagship() -> thud.Impact:
     """Return the impact of the standard ball by finite elements: 19.3 ms, 1.6 kN."""
     return thud.solve(
-        thud.Ball.standard(), model="finite_element", viscosity="kelvin_voigt", loss_factor=0.2
+        thud.Ball(), model="finite_element", viscosity="kelvin_voigt", loss_factor=0.2
     )
 
 

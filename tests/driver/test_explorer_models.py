@@ -71,7 +71,7 @@ def test_every_floor_begins_with_values_that_compute(name: str) -> None:
 
 def test_finite_elements_begin_with_their_own_modulus() -> None:
     case = new_case(values_of("finite_element"))
-    assert case.ball == thud.Ball.standard()
+    assert case.ball == thud.Ball()
     assert answer_case(case)["headline"]["result"] == "conforms"
 
 

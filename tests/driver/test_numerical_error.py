@@ -248,7 +248,7 @@ LARGE = thud.Ball(
 def slipping(
     friction: float,
     mesh: tuple[int, int] = (3, 24),
-    ball: thud.Ball = thud.Ball.standard(),  # noqa: B008 - immutable
+    ball: thud.Ball = thud.Ball(),  # noqa: B008 - immutable
     **options: object,
 ) -> thud.Impact:
     radial, polar = mesh
@@ -274,7 +274,7 @@ def test_stick_and_slip_raises_the_stated_error() -> None:
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
 def test_stated_error_covers_that_of_friction() -> None:
-    standard = thud.Ball.standard()
+    standard = thud.Ball()
     for friction, ball in (0.2, standard), (0.4, standard), (0.8, LARGE):
         coarse, fine = (
             slipping(friction, mesh, ball, duration=0.1) for mesh in ((8, 64), (16, 128))

@@ -24,7 +24,7 @@ MODELS: dict[str, dict[str, Any]] = {
     "modal_ball": {},
     "finite_element": {},
 }  # fmt: skip
-BALLS = {name: thud.Ball() for name in MODELS} | {"finite_element": thud.Ball.standard()}
+BALLS = {name: thud.Ball() for name in MODELS}
 LIGHT = thud.Oscillator(mass=3, stiffness=3e4, damping=5)
 
 
@@ -87,7 +87,7 @@ def test_ball_that_does_not_rebound_is_refused_at_once() -> None:
     sentences = set()
     for duration in (0.05, 0.07, 0.5):
         with pytest.raises(thud.NumericalError, match="stays on the floor") as caught:
-            thud.solve(thud.Ball.standard(), thud.Drop(0.05), model=creeping, duration=duration)
+            thud.solve(thud.Ball(), thud.Drop(0.05), model=creeping, duration=duration)
         sentences.add(str(caught.value))
     assert len(sentences) == 1
 

@@ -19,7 +19,7 @@ lumped: thud.ModelOptions = thud.HuntCrossley(contact_time=0.02, restitution=0.8
 tyre: thud.ModelOptions = thud.TwoMass(belt_mass=1.0)
 impacts["lumped"] = thud.solve(ball, thud.Drop(height=1.0), lumped)
 elements = thud.FiniteElement(viscosity="kelvin_voigt", loss_factor=0.2, snapshot_interval=1e-3)
-flagship = thud.solve(thud.Ball.standard(), model=elements)
+flagship = thud.solve(thud.Ball(), model=elements)
 motion: thud.Motion | None = flagship.motion
 others = thud.HollowSphere("none"), thud.ModalBall(rings=40), thud.MeasuredModes(frequency=[30.0])
 laws = thud.loss_factors(thud.FiniteElement(viscosity="constant_loss"), [50.0, 100.0])
@@ -34,7 +34,7 @@ again = (
 verdict: thud.Verdict = thud.assess_levels([39, 31, 23, 17, 12], 0.02, 0.8, 1, 2.5, 1.0, "tyre")
 missed: list[thud.Criterion] = [one for one in verdict.criteria if not one]
 unknown = thud.Unknowns(key=["friction"], low=[0.0], high=[0.5], reason=["not measured"])
-standard = thud.Case(ball=thud.Ball.standard(), model=thud.FiniteElement(), unknowns=unknown)
+standard = thud.Case(ball=thud.Ball(), model=thud.FiniteElement(), unknowns=unknown)
 likely: thud.Verdict = thud.assess(standard)
 ranges: list[thud.Criterion] = [one for one in likely.criteria if one.range]
 modes: thud.FreeModes = thud.free_modes(ball, thud.Modes(count=2).count)

@@ -67,6 +67,6 @@ def test_momentum_and_energy_balance(model: thud.ModelOptions, oracle: Callable[
 
 
 def test_energy_of_the_elements_balances(oracle: Callable[..., None]) -> None:
-    impact = thud.solve(thud.Ball.standard(), model="finite_element", snapshot_interval=0)
+    impact = thud.solve(thud.Ball(), model="finite_element", snapshot_interval=0)
     oracle("impulse less change of momentum, elements", "balance", impact.impulse_residual, 1e-8)
     oracle("energy of the elements", "balance", impact.energy_residual, 1e-3)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from thud.base.key import Group, Key, Quantity
 
@@ -120,11 +120,6 @@ class Ball(Group):
     gauge_pressure: float = 0.0
     ambient_pressure: float = 101325.0
     heat_capacity_ratio: float = 1.4
-
-    @classmethod
-    def standard(cls) -> Self:
-        """Return the standard rubber ball, which is also the default."""
-        return cls()
 
 
 @dataclass(frozen=True)
