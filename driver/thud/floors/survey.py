@@ -16,11 +16,11 @@ import numpy as np
 
 from thud.base._schema import RATED_BANDS
 from thud.base.bridge import ask
-from thud.base.checks import refuse
+from thud.base.checks import refuse, require_number
 from thud.base.display import Tabulated
 from thud.base.note import Note
 from thud.level.levels import BANDWIDTHS
-from thud.level.rating import Rating, rating, require_volume, standardized_level
+from thud.level.rating import POSITIVE, Rating, rating, standardized_level
 from thud.recordings.table import read_table
 
 if TYPE_CHECKING:
@@ -275,7 +275,7 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
     background, time = (
         columns[kind][0] if kind in columns else None for kind in ("background", "time")
     )
-    volume = None if volume is None else require_volume(volume)
+    volume = None if volume is None else require_number("volume", volume, *POSITIVE, "m3")
     name = Path(path).stem
     return RoomLevels(name, bands, frequency[order], columns[levels], background, time, volume)
 

@@ -21,7 +21,7 @@ from thud.base.checks import (
     require_pair,
 )
 from thud.base.display import Displayed, Tabulated
-from thud.base.immutable import Immutable
+from thud.base.immutable import Immutable, plain
 from thud.base.key import Quantity
 from thud.base.tables import Result
 from thud.level.estimate import NORMAL_FACTOR, NUMERICAL_ERROR, Estimate
@@ -158,14 +158,11 @@ class Criterion(Outcome):
     @property
     def conforms_if_stated(self) -> str:
         """`conforms` if what is not stated contributed up to `allowance`."""
-        value, expanded = self.value, self.estimate.expanded
         conforms, fails, undecided = VERDICTS
-        if math.isnan(value) or not math.isfinite(expanded):
-            return undecided
-        below, above = value + expanded < self.lower, value - expanded > self.upper
-        if below or (above and not self.estimate.upper_bound):
+        low, high = (self.value + sign * self.estimate.expanded for sign in (-1, 1))
+        if high < self.lower or (low > self.upper and not self.estimate.upper_bound):
             return fails
-        inside = value - expanded >= self.lower and value + expanded <= self.upper
+        inside = low >= self.lower and high <= self.upper
         return conforms if inside and not self.estimate.upper_bound else undecided
 
     @property
@@ -223,13 +220,11 @@ class Criterion(Outcome):
         first, result = (quantity.label, quantity.show(self.value)), self.conforms
         if self.range:
             digits = max(quantity.decimals - 1, 1)
-            ends = [f"{end * scale:z.{digits}f}" for end in self.range]
-            if ends[0] == ends[1]:
-                last = "", self.shown_limits, "", ""
-            else:
-                interval, _ = self._last_cells()
-                last = " to ".join(ends), self.shown_limits, interval, self.main_unknown
-            return (*first, *last, Result(result, result))
+            low, high = (f"{end * scale:z.{digits}f}" for end in self.range)
+            width, *last = (f"{low} to {high}", self._last_cells()[0], self.main_unknown)
+            if low == high:
+                width, *last = ("", "", "")
+            return (*first, width, self.shown_limits, *last, Result(result, result))
         expanded = f"{scale * self.estimate.expanded:.2g}" if self.estimate.uncertainty else ""
         expanded = expanded.replace("nan", "unknown") + " †" * bool(self.estimate.not_stated)
         if result == VERDICTS[1]:
@@ -368,20 +363,17 @@ def assess_levels(  # noqa: PLR0913, PLR0917 - each is one criterion of the stan
         If the source or a name in `limits` is not known, `levels` has not five entries, or a value
         is not a number, or not a whole one for `peaks`.
     """
-    require_kind("levels", levels, Iterable)
     # Arrays of other libraries yield scalars of their own.
-    is_array = hasattr(levels, "__array__")
-    octaves = tuple(np.atleast_1d(np.asarray(levels)).tolist() if is_array else levels)
+    octaves = [*(plain(np.asarray(levels)) if hasattr(levels, "__array__") else levels)]
     nominal = get_bands(BANDWIDTHS[0]).nominal
     if len(octaves) != len(nominal):
         allowed = f"{len(nominal)}, the octaves {nominal[0]:g} to {nominal[-1]:g} Hz"
         refuse(f"levels: {len(octaves)} values", allowed)
     values = (*octaves, contact_time, restitution, peaks, mass, drop_height)
     require_choice("source", source, SOURCES)
-    limits = {} if limits is None else limits
+    limits, criteria = limits or {}, []
     require_kind("limits", limits, Mapping)
     refuse_unknown("limits", limits, [name for name, *_ in LIMITS[source]])
-    criteria = []
     for (name, unit, *standard), value in zip(LIMITS[source], values, strict=True):
         if not isinstance(value, Estimate):
             is_unknown = isinstance(value, float | np.floating) and math.isnan(value)

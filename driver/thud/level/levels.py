@@ -9,7 +9,7 @@ import numpy as np
 
 from thud.base._schema import BANDS, BandSet, LevelsForce, LevelsMethod, LimitsSource
 from thud.base.bridge import ask
-from thud.base.checks import refuse, refuse_value, require_array, require_choice, require_number
+from thud.base.checks import MAX_NUMBER, refuse, require_array, require_choice, require_number
 from thud.base.display import Tabulated
 
 if TYPE_CHECKING:
@@ -141,18 +141,19 @@ def peak_count(force: ArrayLike, sample_rate: float) -> int:
     Raise InputError if the force is empty, not finite or not one-dimensional, or the rate, Hz, is
     not positive.
     """
-    record = finite_array("force", force)
-    if not require_number("sample_rate", sample_rate) > 0:
-        refuse_value("sample_rate", sample_rate, "sample_rate > 0")
-    return int(ask("peak_count", force=record, sample_rate=sample_rate)["peak_count"])
+    rate = require_number("sample_rate", sample_rate, 1.0, 1e9, "Hz")
+    answer = ask("peak_count", force=finite_array("force", force), sample_rate=rate)
+    return int(answer["peak_count"])
 
 
 def finite_array(
-    name: str, values: ArrayLike, dimensions: Container[int] = (1,)
-) -> NDArray[np.float64]:
-    """Return an array of finite numbers; raise InputError if it is none, or empty."""
+    name: str, values: ArrayLike, dimensions: Container[int] = (1,),
+    span: tuple[float, float] = (-MAX_NUMBER, MAX_NUMBER), unit: str = "",
+) -> NDArray[np.float64]:  # fmt: skip
+    """Return an array of finite numbers; raise InputError if it is none, empty or out of range."""
     array = require_array(name, values, dimensions, "iuf")
-    if not array.size or not np.isfinite(array).all():
-        problem = "has a value that is not finite" if array.size else "is empty"
-        refuse(f"{name} {problem}", "finite numbers")
+    if not array.size:
+        refuse(f"{name} is empty", "finite numbers")
+    for end in (array.min(), array.max()):
+        require_number(name, end, *span, unit)
     return array

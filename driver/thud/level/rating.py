@@ -10,8 +10,8 @@ import numpy as np
 
 from thud.base._schema import CLASS_LIMITS, RATED_BANDS
 from thud.base.bridge import ask
-from thud.base.checks import refuse, refuse_value, require_choice, require_number
-from thud.base.display import Displayed
+from thud.base.checks import refuse, require_choice, require_number
+from thud.base.display import Tabulated
 from thud.level.levels import BANDWIDTHS, finite_array
 
 if TYPE_CHECKING:
@@ -20,13 +20,16 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from thud.base._schema import BandSet, RoomRating
+    from thud.base.display import Columns
 
 # Maximum magnitude of a sound level, dB.
 MAX_LEVEL = 1000.0
+# Range of volumes, m3, and times, s: any that are positive.
+POSITIVE = 1e-9, 1e9
 
 
 @dataclass(frozen=True, repr=False)
-class Rating(Displayed):
+class Rating(Tabulated):
     """Single-number rating of the levels of a heavy/soft impact source in the room below.
 
     Attributes
@@ -53,14 +56,19 @@ class Rating(Displayed):
 
     def __repr__(self) -> str:
         """Return rating and class."""
+        number = self.korean_class
+        name = f", {f'class {number}' if number else 'no class'} (KS F 2863-2)"
         level = f"L_iA,Fmax {self.rounded} dB ({self.a_weighted:.2f})"
-        korean = self.korean_class
-        name = f"class {korean}" if korean else "no class"
-        class_ = "" if korean is None else f", {name} (KS F 2863-2)"
-        return f"<Rating, {self.bands}s: {level}{class_}>"
+        return f"<Rating, {self.bands}s: {level}{'' if number is None else name}>"
+
+    def columns(self) -> Columns:
+        """Return the numbers; NaN where one-third octaves have none."""
+        names = ("L_iA,Fmax, dB", "rounded, dB", "class", "inverse-A curve, dB")
+        values = (self.a_weighted, self.rounded, self.korean_class, self.curve)
+        return {"rating": (names, ""), "value": ([np.nan if v is None else v for v in values], "g")}
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text."""
+        """Return header and rows of text, with the standards."""
         rows: list[tuple[str, ...]] = [
             ("rating", "value"),
             ("L_iA,Fmax, dB (ISO 717-2)", f"{self.rounded} ({self.a_weighted:.2f})"),
@@ -192,24 +200,17 @@ def rating(levels: ArrayLike, bands: BandSet = "octave") -> Rating:
     """
     require_choice("bands", bands, RATED_BANDS)
     frequencies = RATED_BANDS[bands]
-    values = finite_array("levels", levels)
+    values = finite_array("levels", levels, (1,), (-MAX_LEVEL, MAX_LEVEL), "dB")
     if values.shape != (len(frequencies),):
         refuse(
             f"levels have the shape {values.shape}",
             f"({len(frequencies)},), the {bands}s {frequencies[0]:g} to {frequencies[-1]:g} Hz",
         )
-    excess = values[abs(values) > MAX_LEVEL]
-    if excess.size:
-        refuse_value("levels", float(excess[0]), f"{-MAX_LEVEL:g} to {MAX_LEVEL:g} dB")
     answer = ask("rating", bands=bands, levels=values)
-    has_classes = bands == BANDWIDTHS[0]
-    return Rating(
-        bands,
-        answer["a_weighted"],
-        int(answer["rounded"]),
-        int(answer["class"]) if has_classes else None,
-        int(answer["curve"]) if has_classes else None,
-    )
+    class_, curve = None, None
+    if bands == BANDWIDTHS[0]:
+        class_, curve = int(answer["class"]), int(answer["curve"])
+    return Rating(bands, answer["a_weighted"], int(answer["rounded"]), class_, curve)
 
 
 def standardized_level(
@@ -239,23 +240,14 @@ def standardized_level(
     InputError
         If a value is not finite, a time or the volume is not positive, or the lengths differ.
     """
-    values = np.atleast_1d(finite_array("level", level, (0, 1)))
-    times = np.atleast_1d(finite_array("reverberation_time", reverberation_time, (0, 1)))
+    values = finite_array("level", level, (0, 1)).ravel()
+    times = finite_array("reverberation_time", reverberation_time, (0, 1), POSITIVE, "s").ravel()
     if len(times) not in {1, len(values)}:
         refuse(
             f"reverberation_time has {len(times)} values for {len(values)} levels",
             "one, or one for each level",
         )
-    if (times <= 0).any():
-        refuse_value("reverberation_time", float(times.min()), "reverberation_time > 0, s")
     times = np.broadcast_to(times, values.shape)
-    answer = ask("rating", levels=values, reverberation_time=times, volume=require_volume(volume))
+    volume = require_number("volume", volume, *POSITIVE, "m3")
+    answer = ask("rating", levels=values, reverberation_time=times, volume=volume)
     return np.asarray(answer["levels"])
-
-
-def require_volume(volume: object) -> float:
-    """Return a volume, m3; raise InputError if it is not positive and finite."""
-    value = require_number("volume", volume)
-    if not value > 0:
-        refuse_value("volume", volume, "volume > 0, m3")
-    return value
