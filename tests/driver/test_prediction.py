@@ -560,7 +560,7 @@ def test_reverberation_time_is_one_number_or_a_list() -> None:
         floor=thud.Plate(), room=thud.Room(reverberation_time=(0.9, 0.6, 0.5, 0.4))
     )
     assert octaves.reverberation_time.tolist() == [0.9] * 3 + [0.6] * 3 + [0.5] * 3 + [0.4] * 3
-    with pytest.raises(thud.InputError, match=naming("reverberation_time", [])):
+    with pytest.raises(TypeError, match=naming("reverberation_time", [])):
         thud.Room(reverberation_time=())
 
 

@@ -39,18 +39,6 @@ def ask(question: str, /, **request: str | bytes | float | NDArray[np.float64]) 
     they raise nothing; other threads raise KeyboardInterrupt. Raise InputError or NumericalError
     with the message of the library.
     """
-    packed = _packed(request)
-    while (answer := api.ask(question, *packed))[0] > _INTERRUPTED:
-        api.collect(*answer[1:])
-        if threading.current_thread() is not threading.main_thread():
-            raise KeyboardInterrupt
-    return _collect(*answer)
-
-
-def _packed(
-    request: Mapping[str, str | bytes | float | NDArray[np.float64]],
-) -> tuple[str, bytes, NDArray[np.float64]]:
-    """Return header, texts and values of a request; arrays are flattened in Fortran order."""
     header, texts = "", b""
     count, arrays = 0, [np.zeros(0)]
     for name, value in request.items():
@@ -62,9 +50,13 @@ def _packed(
             arrays.append(np.ravel(value, order="F"))
             header += f"{name}\t{count + 1} {len(arrays[-1])}\n"
             count += len(arrays[-1])
-    if not count:
-        arrays.append(np.zeros(1))  # f2py does not pass empty arrays
-    return header, texts, np.concatenate(arrays)
+    # f2py does not pass empty arrays.
+    values = np.concatenate(arrays) if count else np.zeros(1)
+    while (answer := api.ask(question, header, texts, values))[0] > _INTERRUPTED:
+        api.collect(*answer[1:])
+        if threading.current_thread() is not threading.main_thread():
+            raise KeyboardInterrupt
+    return _collect(*answer)
 
 
 def _collect(status: int, handle: int, n_byte: int, n_value: int) -> Bundle:
@@ -89,10 +81,10 @@ def _collect(status: int, handle: int, n_byte: int, n_value: int) -> Bundle:
     if status:
         note = None
         if "group" in answer:
-            subject = ".".join(answer[name] for name in ("group", "key") if answer[name])
-            value, low, high, low_open, high_open = answer.get("range", [math.nan] * 3 + [0.0] * 2)
+            subject = ".".join(filter(None, (answer["group"], answer["key"])))
+            value, low, high, *is_open = answer.get("range", [math.nan] * 3 + [0.0] * 2)
             others = {"name": _name(subject), "text": answer["problem"]}
-            others |= {"low_open": low_open, "high_open": high_open}
+            others |= dict(zip(("low_open", "high_open"), is_open, strict=True))
             note = Note("refused", subject, value, low, high, others=others)
         raise _ERRORS.get(status, NumericalError)(answer["message"], note)
     return answer
@@ -115,8 +107,8 @@ def notes(group: Mapping[str, Any]) -> tuple[Note, ...]:
         for name in ("value", "low", "high")
     )
     return tuple(
-        Note(code, subject, value, low, high, others={"name": _name(subject), "text": said})
-        for code, subject, said, value, low, high in zip(*words, *numbers, strict=True)
+        Note(code, subject, value, low, high, others={"name": _name(subject), "text": text})
+        for code, subject, text, value, low, high in zip(*words, *numbers, strict=True)
     )
 
 

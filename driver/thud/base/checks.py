@@ -18,10 +18,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike, NDArray
 
-# Maximum length of a value in a message; of longer values the message shows the type.
-MAX_SHOWN = 80
-# The same of a text or a path, which is cut.
-MAX_TEXT = 200
+# Maximum lengths of a value, and of a text or a path, in a message; longer ones are cut.
+MAX_SHOWN, MAX_TEXT = 80, 200
 # Maximum magnitude of all numbers; Python does not print much larger integers.
 MAX_NUMBER = 10**300
 # Maximum seed of the libraries that draw random samples.
@@ -111,20 +109,15 @@ def require_array(
         refuse(f"{name} has {array.ndim} dimensions", allowed)
     if np.ma.is_masked(values):
         refuse(f"{name} has masked entries", "values only")
-    if not kinds:
-        return array
-    if array.size and array.dtype.kind not in kinds:
+    if kinds and array.size and array.dtype.kind not in kinds:
         refuse(f"{name} is not an array of real numbers", "one dimension of real numbers")
-    return np.asarray(array, dtype=np.float64, order="C")
+    return np.asarray(array, dtype=np.float64, order="C") if kinds else array
 
 
 def require_pair(
-    name: str,
-    values: object,
-    allowed: str = "two finite numbers",
-    low: float = -MAX_NUMBER,
-    high: float = MAX_NUMBER,
-) -> tuple[float, float]:
+    name: str, values: object, allowed: str = "two finite numbers",
+    low: float = -MAX_NUMBER, high: float = MAX_NUMBER,
+) -> tuple[float, float]:  # fmt: skip
     """Return two numbers from low to high; raise InputError if the values are not `allowed`."""
     pair = plain(values)
     if not isinstance(pair, tuple) or len(pair) != 2:  # noqa: PLR2004
@@ -135,52 +128,40 @@ def require_pair(
 
 def require_whole(name: str, value: Any, low: int, high: int) -> int:  # noqa: ANN401
     """Return a whole number from low to high; raise InputError if a value is none."""
-    is_whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if not is_whole or not low <= value <= high:
+    whole = plain(value)
+    if type(whole) is not int or not low <= whole <= high:
         refuse_value(name, value, f"whole numbers from {low} to {high}")
-    return int(value)
+    return whole
 
 
 def require_number(
-    name: str,
-    value: Any,  # noqa: ANN401 - of a user
-    low: float = -MAX_NUMBER,
-    high: float = MAX_NUMBER,
-    unit: str = "",
+    name: str, value: object, low: float = -MAX_NUMBER, high: float = MAX_NUMBER, unit: str = ""
 ) -> float:
     """Return a number; raise InputError if a value is none from low to high, in a unit."""
-    number = value if isinstance(value, int | float | np.integer | np.floating) else math.nan
-    # NumPy does not compare all of its numbers with large integers of Python.
-    number = float(number) if isinstance(number, np.generic) else number
-    if isinstance(value, bool) or not low <= number <= high:
+    number = plain(value)
+    if type(number) not in {int, float} or not low <= number <= high:
         if high == MAX_NUMBER:
             refuse_value(name, value, "finite numbers")
         refuse_value(name, value, f"{low:g} to {high:g} {unit}".rstrip(), low=low, high=high)
-    return float(value)
+    return float(number)
 
 
 def shown(value: object) -> str:
-    """Return the text of a value for a message, or its type if the text is long."""
+    """Return the text of a value for a message; of long ones, both ends."""
     if isinstance(value, int) and abs(value) > MAX_NUMBER:
         return "a very large number"
     # Objects store the lists of files as tuples.
-    text = repr(list(value) if type(value) is tuple else value)
-    fits = len(text) <= MAX_SHOWN and "\n" not in text
-    if fits:
-        return text
-    if isinstance(value, str):
-        return f"a text of {len(value)} characters"
-    return f"an object of {type(value).__name__}"
+    return shown_text(repr(list(value) if type(value) is tuple else value), MAX_SHOWN)
 
 
-def shown_text(text: object) -> str:
+def shown_text(text: object, limit: int = MAX_TEXT) -> str:
     """Return text of a file or a library, or a path, for a message: printable, in one line.
 
     Of long texts both ends are shown.
     """
     line = " ".join(str(text).split())
-    if len(line) > MAX_TEXT:
-        line = f"{line[: MAX_TEXT // 2]} ... {line[-MAX_TEXT // 2 :]}"
+    if len(line) > limit:
+        line = f"{line[: limit // 2]} ... {line[-limit // 2 :]}"
     return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in line)
 
 

@@ -86,7 +86,7 @@ class Tabulated(Displayed):
     def to_csv(self) -> str:
         """Return the table of `to_dataframe` as text, with ten digits."""
         rows = zip(*(values.tolist() for values in self._named().values()), strict=True)
-        texts = ([f"{v:.10g}" if isinstance(v, float) else v for v in row] for row in rows)
+        texts = ([v if isinstance(v, str) else f"{v:.10g}" for v in row] for row in rows)
         return csv_text([[*self._named()], *texts])
 
     def save(self, path: str | os.PathLike[str]) -> None:

@@ -76,35 +76,34 @@ class Key:
         whole = ", whole" if self.whole or self.kind == "whole" else ""
         return f"{low} {signs[0]} {self.name} {signs[1]} {high} {self.unit}".rstrip() + whole
 
-    def is_typed(self, value: object) -> bool:
-        """Whether a value is of the type of the key, a tuple where the key takes several."""
-        return all(type(entry) in _TYPES[self.kind] for entry in self._entries(value))
+    def require(self, value: object, *, of_file: bool = True) -> None:
+        """Raise InputError if a value is not allowed, whatever the values of other keys are.
 
-    def require(self, value: object) -> None:
-        """Raise InputError if a value of Python is not allowed, whatever other keys are."""
+        For a value that is not of a file but of Python, a wrong type is a TypeError.
+        """
         low = -math.inf if isinstance(self.lower, str) else self.lower
         high = math.inf if isinstance(self.upper, str) else self.upper
-        for entry in self._entries(value):
-            if isinstance(entry, str):
+        is_list = isinstance(value, tuple) and value and self.kind in {"list", "texts"}
+        entries: Any = value if is_list else (value,)
+        for entry in entries:
+            if not (is_typed := type(entry) in _TYPES[self.kind]):
+                fits = False
+            elif isinstance(entry, str):
                 fits = entry in self.choices if self.choices else entry.isprintable()
-            elif fits := self.is_typed(entry):
+            else:
                 above = low < entry or (entry == low and not self.lower_open)
                 fits = above and (entry < high or (entry == high and not self.upper_open))
-            if not (fits and self.is_typed(entry)):
-                ends = {
-                    name: end if math.isfinite(end) else math.nan
-                    for name, end in (("low", low), ("high", high))
-                }
-                refuse_value(
-                    f"&{self.group}: {self.name}", entry, self.allowed, **ends,
-                    subject=f"{self.group}.{self.name}", low_open=self.lower_open,
-                    high_open=self.upper_open,
-                )  # fmt: skip
-
-    def _entries(self, value: Any) -> tuple[Any, ...]:  # noqa: ANN401 - of a user
-        """Return the entries of a list, or the only value."""
-        is_list = isinstance(value, tuple) and self.kind in {"list", "texts"}
-        return value if is_list else (value,)
+            if fits:
+                continue
+            name, subject = f"&{self.group}: {self.name}", f"{self.group}.{self.name}"
+            if not (is_typed or of_file):
+                message = f"{name} = {shown(entry)} is not allowed; allowed: {self.allowed}"
+                raise TypeError(message)
+            refuse_value(
+                name, entry, self.allowed, subject=subject, low_open=self.lower_open,
+                low=low if math.isfinite(low) else math.nan, high_open=self.upper_open,
+                high=high if math.isfinite(high) else math.nan,
+            )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -160,22 +159,14 @@ class Group:
     def __post_init__(self) -> None:
         """Store plain values; a number or a text becomes a list of one where a list is needed.
 
-        Raise TypeError if a value is not of the type of its key, and InputError if it is not
-        allowed or a list that has a default is empty; ranges that depend on other keys are checked
-        when the group is used.
+        Raise TypeError if a value is not of the type of its key or a list that has a default is
+        empty, and InputError if a value is not allowed; ranges that depend on other keys are
+        checked when the group is used.
         """
         for option in fields(self):  # type: ignore[arg-type]
             value, key = plain(getattr(self, option.name)), self.keys.get(option.name)
             if isinstance(option.default, tuple) and isinstance(value, int | float | str):
                 value = (value,)
             object.__setattr__(self, option.name, value)
-            if key is None or (value is None and option.default is None):
-                continue
-            if not key.is_typed(value):
-                name = f"&{key.group}: {key.name}"
-                message = f"{name} = {shown(value)} is not allowed; allowed: {key.allowed}"
-                raise TypeError(message)
-            if option.default and value == ():
-                name, subject = f"&{key.group}: {key.name}", f"{key.group}.{key.name}"
-                refuse_value(name, [], f"one or more numbers, {key.allowed}", subject=subject)
-            key.require(value)
+            if key and value != option.default:
+                key.require(value, of_file=False)

@@ -63,16 +63,12 @@ def to_line(name: str, value: object) -> str:
 
 def to_text(name: str, value: object) -> str:
     """Return a line of text that is not blank; raise InputError if a value is none."""
-    if not to_line(name, value).strip():
-        refuse_value(name, value, "a text in one line")
-    return str(value)
+    return to_line(name, value) if str(value).strip() else refuse_value(name, value, "a text")
 
 
 def require_table(name: str, value: object) -> Mapping[str, Any]:
     """Return a table; raise InputError if a value is none."""
-    if not isinstance(value, Mapping):
-        refuse_value(name, value, "a table")
-    return value
+    return value if isinstance(value, Mapping) else refuse_value(name, value, "a table")
 
 
 def key(check: Check, meaning: str, default: object = None) -> Any:  # noqa: ANN401 - a field of any type
@@ -116,7 +112,7 @@ class TomlTable:
             for entry, value in values
             # The default of keys without another one is an empty table.
             if value is not None and value is not entry.default
-            if entry.default is not MISSING or not (isinstance(value, dict) and not value)
+            if entry.default is not MISSING or value != {}
         ]
 
     def require(self, *names: str) -> None:

@@ -6,7 +6,14 @@ import math
 import re
 from decimal import Decimal
 
-from thud.base.checks import refuse, require_kind, shown, suggestion
+from thud.base.checks import (
+    refuse,
+    refuse_value,
+    require_kind,
+    require_number,
+    shown,
+    suggestion,
+)
 
 # By base unit, that of a key of this dimension: sizes of units in it.
 SIZES: dict[str, dict[str, float]] = {
@@ -47,24 +54,17 @@ UNITS = {
     if base not in _OF_KEYS
     for unit, size in sizes.items()
 }
-# Other spellings, in lower case and without blanks.
-SPELLINGS = {
-    "newton": "N", "newtons": "N", "kilonewton": "kN", "kilonewtons": "kN", "n": "N", "kn": "kN",
-    "lb": "lbf", "lbs": "lbf", "volt": "V", "volts": "V", "v": "V", "mv": "mV", "millivolt": "mV",
-    "millivolts": "mV", "pc": "pC", "count": "counts", "digit": "counts", "digits": "counts",
-    "lsb": "counts", "bit": "counts", "bits": "counts", "cts": "counts", "adc": "counts",
-    "fs": "FS", "fullscale": "FS",
-    "sec": "s", "second": "s", "seconds": "s", "sekunden": "s", "msec": "ms", "millisecond": "ms",
-    "milliseconds": "ms", "usec": "us", "microsecond": "us", "microseconds": "us", "nsec": "ns",
-    "nanosecond": "ns", "nanoseconds": "ns", "minute": "min", "minutes": "min", "hour": "h",
-    "hours": "h", "hz": "Hz", "hertz": "Hz", "khz": "kHz", "mhz": "MHz",
-    "s/s": "Hz", "1/s": "Hz", "sps": "Hz",
-    "m/s/s": "m/s2", "db": "dB", "dbz": "dB", "db(lin)": "dB", "dbre20upa": "dB", "°": "deg",
-    "degree": "deg", "degrees": "deg", "grad": "deg", "°c": "degC",
-    "m/ns": "m/(Ns)", "m/s/n": "m/(Ns)", "(m/s)/n": "m/(Ns)", "mm/ns": "mm/(Ns)",
-    "mm/s/n": "mm/(Ns)", "(mm/s)/n": "mm/(Ns)", "m/s2/n": "m/(Ns2)", "(m/s2)/n": "m/(Ns2)",
-    "m/ns2": "m/(Ns2)", "kg-1": "1/kg",
+# Other spellings by unit, in lower case, without blanks and the "s" of plurals.
+_WORDS = {
+    "N": "newton n", "kN": "kilonewton kn", "lbf": "lb lbs", "V": "volt v", "mV": "millivolt mv",
+    "pC": "pc", "counts": "count digit lsb bit cts adc", "FS": "fs fullscale",
+    "s": "sec second sekunden", "ms": "msec millisecond", "us": "usec microsecond",
+    "ns": "nsec nanosecond", "min": "minute", "h": "hour", "Hz": "hz hertz s/s 1/s sps",
+    "kHz": "khz", "MHz": "mhz", "m/s2": "m/s/s", "dB": "db dbz db(lin) dbre20upa",
+    "deg": "° degree grad", "degC": "°c", "m/(Ns)": "m/ns m/s/n (m/s)/n",
+    "mm/(Ns)": "mm/ns mm/s/n (mm/s)/n", "m/(Ns2)": "m/s2/n (m/s2)/n m/ns2", "1/kg": "kg-1",
 }  # fmt: skip
+SPELLINGS = {word: unit for unit, words in _WORDS.items() for word in words.split()}
 _PLAIN = str.maketrans("\u00b5\u03bc\u00b2\u00b3", "uu23", " *\u00b7\u22c5^\u00a0")
 # The number at the beginning of a quantity.
 NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
@@ -86,8 +86,10 @@ def find_unit(text: str) -> str:
     ('N', 'm/s2', '')
     """
     name = text.translate(_PLAIN)
-    lower = SPELLINGS.get(name.casefold(), name.casefold())
-    return name if name in UNITS else lower if lower in UNITS else ""
+    lower = name.casefold()
+    singular = lower.removesuffix("s") if lower.isalpha() and len(lower) > len("kgs") else lower
+    unit = SPELLINGS.get(lower) or SPELLINGS.get(singular, lower)
+    return name if name in UNITS else unit if unit in UNITS else ""
 
 
 def size_of(text: str) -> tuple[str, float]:
@@ -156,18 +158,13 @@ def quantity(text: str) -> float:
     require_kind("quantity", text, str)
     units = {unit: power for base in SIZES for unit, power in powers_of(base).items()}
     match = NUMBER.match(text)
-    if match is None or not math.isfinite(float(match[1])):
-        refuse(f"quantity = {shown(text)} is not a number and its unit", "such as '32 mm'")
+    if match is None:
+        refuse_value("quantity", text, "a number and its unit, such as '32 mm'")
     unit = text[match.end() :].strip()
     if unit not in units:
-        unknown = f"unit {shown(unit)} is not known{suggestion(unit, units)}"
-        refuse(
-            f"quantity = {shown(text)}: {unknown if unit else 'unit is missing'}", ", ".join(units)
-        )
-    value = scaled(float(match[1]), units[unit])
-    if not math.isfinite(value):
-        refuse(f"quantity = {shown(text)} is too large", "finite numbers")
-    return value + 0.0
+        refuse_value("quantity", text, f"units{suggestion(unit, units)}: {', '.join(units)}")
+    value = scaled(float(match[1]), units[unit]) if math.isfinite(float(match[1])) else math.inf
+    return require_number(f"quantity {shown(text)}", value) + 0.0
 
 
 def scaled(value: float, power: int) -> float:

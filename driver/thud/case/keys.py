@@ -14,6 +14,7 @@ from thud.case.case import attribute_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+    from typing import Any
 
     from thud.case.case import Case
 
@@ -82,20 +83,18 @@ def find_key(name: str, case: Case) -> tuple[Key, int | None]:
 def with_values(case: Case, values: Mapping[str, object]) -> Case:
     """Return a copy of a case with new values of some keys, named as in `find_key`."""
     assert case.model is not None  # noqa: S101 - studies have a model, see `read_study`
-    groups: dict[str, dict[str, object]] = {}
+    groups: dict[str, dict[str, Any]] = {}
     for name, value in values.items():
         key, entry = find_key(name, case)
-        group = attribute_of(key)
-        changes = groups.setdefault(group, {})
+        changes = groups.setdefault(attribute_of(key), {})
         key.require(plain(value))
-        if entry is None:
-            changes[key.name] = value
-        else:
-            entries = list(changes.get(key.name, getattr(getattr(case, group), key.name)))  # type: ignore[call-overload]
+        if entry:
+            before: Any = getattr(getattr(case, attribute_of(key)), key.name)
+            entries = [*(changes.get(key.name) or before)]
             if entry > len(entries):
                 refuse(f"{name} does not exist", f"entries 1 to {len(entries)} of the case")
             entries[entry - 1] = value
-            changes[key.name] = tuple(entries)
+        changes[key.name] = tuple(entries) if entry else value
     changed = {group: dataclasses.replace(getattr(case, group), **c) for group, c in groups.items()}
     return dataclasses.replace(case, **changed)
 
