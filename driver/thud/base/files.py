@@ -38,9 +38,8 @@ def replace_file(path: str | os.PathLike[str], content: bytes) -> None:
         try:
             part.write_bytes(content)
             part.replace(target)
-        except BaseException:
+        finally:
             part.unlink(missing_ok=True)
-            raise
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from error
     except ValueError as error:  # a path that no file system can hold
@@ -118,10 +117,9 @@ class Results:
         Raise InputError if the directory may not be replaced, and OSError if a file cannot be
         written.
         """
-        if not contents:
-            return []
-        with self.new_folder() as part:
-            self.write_into(part, contents)
+        if contents:
+            with self.new_folder() as part:
+                self.write_into(part, contents)
         return [self.folder / name for name in contents]
 
     def write_into(self, part: Path, contents: Mapping[str, bytes]) -> None:

@@ -112,7 +112,7 @@ class TomlTable:
             for entry, value in values
             # The default of keys without another one is an empty table.
             if value is not None and value is not entry.default
-            if entry.default is not MISSING or value != {}
+            if entry.default is not MISSING or not (isinstance(value, dict) and not value)
         ]
 
     def require(self, *names: str) -> None:

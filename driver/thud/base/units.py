@@ -9,10 +9,10 @@ from decimal import Decimal
 from thud.base.checks import (
     refuse,
     refuse_value,
+    require_choice,
     require_kind,
     require_number,
     shown,
-    suggestion,
 )
 
 # By base unit, that of a key of this dimension: sizes of units in it.
@@ -131,10 +131,7 @@ def power_of(unit: object, key_unit: str, label: str) -> int:
     Raise InputError if the unit does not fit; its message begins with `label`.
     """
     powers = powers_of(key_unit)
-    if not isinstance(unit, str) or unit not in powers:
-        hint = suggestion(unit, powers)
-        refuse(f"{label}: unit {shown(unit)} does not fit{hint}", ", ".join(powers))
-    return powers[unit]
+    return powers[require_choice(f"{label}: unit", unit, powers)]
 
 
 def quantity(text: str) -> float:
@@ -160,9 +157,7 @@ def quantity(text: str) -> float:
     match = NUMBER.match(text)
     if match is None:
         refuse_value("quantity", text, "a number and its unit, such as '32 mm'")
-    unit = text[match.end() :].strip()
-    if unit not in units:
-        refuse_value("quantity", text, f"units{suggestion(unit, units)}: {', '.join(units)}")
+    unit = require_choice(f"quantity {shown(text)}: unit", text[match.end() :].strip(), units)
     value = scaled(float(match[1]), units[unit]) if math.isfinite(float(match[1])) else math.inf
     return require_number(f"quantity {shown(text)}", value) + 0.0
 
