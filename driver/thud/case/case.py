@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -35,15 +34,15 @@ from thud.base.checks import (
     refuse_unknown,
     require_choice,
     require_kind,
-    shown,
     suggestion,
 )
 from thud.base.display import Displayed
 from thud.base.files import replace_file
 from thud.base.immutable import plain
+from thud.base.toml_tables import require_table
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Mapping
     from typing import Any, Self
 
     from thud.base.key import Group, Key
@@ -74,9 +73,7 @@ def new_model(model: str | ModelOptions | None, options: Mapping[str, object]) -
             problem = f"model is an object of {type(model).__name__}, with {', '.join(options)}"
             refuse(problem, "options in the object, or as keywords with the name of a model")
         return model
-    if model is None:
-        model = ModalBall.name
-    require_choice("&model: name", model, MODELS)
+    model = require_choice("&model: name", ModalBall.name if model is None else model, MODELS)
     known = [option.name for option in fields(MODELS[model])]
     for word in options.keys() - known:
         owners = dict.fromkeys(key.owner or f"&{key.group}" for key in KEYS if key.name == word)
@@ -203,9 +200,7 @@ class Case(Displayed):
         content: dict[str, Any] = dict(namelist)
         refuse_unknown("the case", content, _NAMES)
         for group, keys in content.items():
-            if not isinstance(keys, Mapping):
-                refuse(f"&{group} = {shown(keys)} is not a table", "keys and their values")
-            refuse_unknown(f"&{group}", keys, _NAMES[group])
+            refuse_unknown(f"&{group}", require_table(f"&{group}", keys), _NAMES[group])
         optional = {group: kind for group, kind in OPTIONAL_GROUPS.items() if group in content}
         kinds: dict[str, type[Group]] = {**GROUPS, **optional}
         for group, choices in (("model", MODELS), ("floor", FLOORS)):
@@ -229,11 +224,7 @@ def case_text(case: Case) -> bytes:
 
 
 def impact_only(case: Case) -> Case:
-    """Return a case without free modes, compression and unknowns, which an impact does not use.
-
-    `free_modes`, `compress` and `assess` use them; fits and studies may compute drops outside the
-    ranges of the unknowns.
-    """
+    """Return a case without free modes, compression and unknowns, which an impact does not use."""
     return replace(case, modes=None, compression=None, unknowns=None)
 
 

@@ -115,11 +115,6 @@ class Construction(Displayed):
             its floor if the room does not state both or is in a corner of the floor. Joists span
             the length that the construction states, else that of the joists of `source`, else the
             shorter side; the room turns with them.
-
-        Raises
-        ------
-        InputError
-            If `source` is not a case.
         """
         require_kind("source", source, Case | None)
         source = source or Case(room=Room())
@@ -134,10 +129,8 @@ class Construction(Displayed):
         if isinstance(self.floor, JoistFloor):
             if not isinstance(source.floor, JoistFloor) and length > width:
                 length, width = width, length
-                room = replace(
-                    room, length=room.width, width=room.length,
-                    corner_x=room.corner_y, corner_y=room.corner_x,
-                )  # fmt: skip
+                corner: dict[str, Any] = {"corner_x": room.corner_y, "corner_y": room.corner_x}
+                room = replace(room, length=room.width, width=room.length, **corner)
             if "length" in self.sources:
                 length = self.floor.length
         return replace(result, room=room, floor=replace(self.floor, length=length, width=width))
