@@ -41,10 +41,15 @@ from .floors.impedance import (
     BallImpedance as BallImpedance,
     ball_impedance as ball_impedance,
 )
+from .floors.mobility import (
+    Mobility as Mobility,
+    mobility as mobility,
+)
 from .floors.mobility_fit import (
     MobilityFit as MobilityFit,
     fit_mobility as fit_mobility,
 )
+from .floors.mobility_table import read_mobility as read_mobility
 from .floors.modal_room import (
     ModalRoom as ModalRoom,
     modal_room as modal_room,
@@ -73,7 +78,6 @@ from .impact.ensemble import (
 from .impact.floor_impact import (
     FloorEnergy as FloorEnergy,
     FloorImpact as FloorImpact,
-    mobility as mobility,
 )
 from .impact.free_modes import (
     FreeModes as FreeModes,

@@ -74,7 +74,7 @@ def test_file_is_a_floor_whose_values_have_sources(path: Path) -> None:
         assert (list(value) if isinstance(value, tuple) else value) == cell["value"]
     cited = re.findall(r"\b(?:EN|ISO|DIN|ETA) \d[\d-]*", path.read_text(encoding="utf-8"))
     assert set(cited) <= CITED
-    assert np.isfinite(thud.mobility(entry.floor, [31.5, 500.0])).all()
+    assert np.isfinite(thud.mobility(entry.floor, [31.5, 500.0]).values).all()
 
 
 def mass_of_keys(entry: thud.Construction) -> float | None:

@@ -46,7 +46,7 @@ FLOORS: list[tuple[str, dict[str, Any], str]] = [
 def answer(name: str, keys: dict[str, Any]) -> str:
     """Return the sentence that refuses a floor, or nothing if it has a mobility."""
     try:
-        mobility = thud.mobility(getattr(thud, name)(**keys), [31.5])[0]
+        mobility = thud.mobility(getattr(thud, name)(**keys), [31.5]).values[0]
     except thud.ThudError as error:
         return str(error)
     return "" if 0 < abs(mobility) < 1 else f"mobility {mobility}"

@@ -96,7 +96,9 @@ def test_energies_are_those_of_contact_force_and_mobility(
     line = np.fft.rfftfreq(length, 1 / moved.sample_rate)
     line = line[line < 1000]
     power = abs(np.fft.rfft(moved.floor_force, length)[: len(line)] / moved.sample_rate) ** 2
-    below = cumulative_trapezoid(2 * power * thud.mobility(floor, line).real, line, initial=0)
+    below = cumulative_trapezoid(
+        2 * power * thud.mobility(floor, line).values.real, line, initial=0
+    )
     for bands in ("octave", "third"):
         edges = thud.get_bands(bands)
         expected = np.interp(edges.upper, line, below) - np.interp(edges.lower, line, below)
@@ -118,10 +120,10 @@ def test_mobility_is_that_of_the_closed_form(oracle: Callable[..., None]) -> Non
     oracle(
         "mobility of an oscillator",
         "closed form",
-        thud.mobility(floor, frequency) / expected - 1,
+        thud.mobility(floor, frequency).values / expected - 1,
         1e-11,
     )
-    assert thud.mobility(thud.Rigid(), 50.0) == pytest.approx([0.0])
+    assert thud.mobility(thud.Rigid(), 50.0).values == pytest.approx([0.0])
 
 
 @pytest.mark.parametrize("model", ["hollow_sphere", "finite_element"])
@@ -211,7 +213,7 @@ def test_points_without_a_second_coordinate_are_refused_in_the_group_of_their_fl
 def test_points_are_of_floors_with_sides(moved: thud.FloorImpact) -> None:
     for ask in (
         lambda: moved.velocity_at(1.0, 1.0),
-        lambda: thud.mobility(LIGHT, [50.0], np.array([1.0, 1.0])),  # type: ignore[arg-type]
+        lambda: thud.mobility(LIGHT, [50.0], np.array([1.0, 1.0])).values,  # type: ignore[arg-type]
     ):
         with pytest.raises(thud.InputError, match=naming("no point except")):
             ask()

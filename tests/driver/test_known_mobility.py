@@ -18,7 +18,7 @@ FREQUENCY = np.arange(10.0, 1000.0)
 
 def known_floor(plate: thud.Plate) -> thud.MeasuredMobility:
     """Return the mobility of a plate at a point, fitted, with the plate."""
-    fit = thud.fit_mobility((FREQUENCY, thud.mobility(plate, FREQUENCY)))
+    fit = thud.fit_mobility(thud.mobility(plate, FREQUENCY))
     return replace(fit.floor, **{key: getattr(plate, key) for key in SIDES})
 
 
@@ -38,7 +38,7 @@ def test_level_of_a_plate_changes_by_its_mobility(
     assert known.loss_factor == pytest.approx(plate.loss_factor)
     # Mean of Re Y in each band, by quadrature.
     fine = np.linspace(40, 720, 68001)
-    conductance = thud.mobility(PLATE, fine).real
+    conductance = thud.mobility(PLATE, fine).values.real
     bands = thud.get_bands("third")
     rated = np.isin(bands.nominal, known.frequency)
     change = np.array([

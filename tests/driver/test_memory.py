@@ -11,7 +11,7 @@ CALLS = {
     "levels by FFT": "thud.force_exposure_levels(x, 44100.0, method='fft')",
     "low-pass": "levels.low_pass(x, 44100.0)",
     "peaks": "levels.peak_count(x, 44100.0)",
-    "mobility": "thud.mobility(thud.Oscillator(), np.abs(x) + 1.0)",
+    "mobility": "thud.mobility(thud.Oscillator(), np.abs(x) + 1.0).values",
     "long drop": "thud.solve(duration=1.0, sample_rate=4e6)",
 }
 CODE = """

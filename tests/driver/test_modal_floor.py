@@ -105,29 +105,30 @@ def test_mobility_is_the_sum_of_the_modes(path: Path) -> None:
     square = modes.shape[:, 0, 0] ** 2
     exact = np.sum(s * square / (s**2 + modes.loss_factor * omega * s + omega**2), axis=1)
     # Of the highest modes with five grid spacings per wavelength, splines miss up to 1 %.
-    assert thud.mobility(BARE, frequency) == pytest.approx(exact, rel=0.02, abs=1e-8)
+    assert thud.mobility(BARE, frequency).values == pytest.approx(exact, rel=0.02, abs=1e-8)
     slab(800, *grid(41, 33)).write(path)
-    assert thud.mobility(BARE, frequency) == pytest.approx(exact, rel=2e-3, abs=1e-9)
+    assert thud.mobility(BARE, frequency).values == pytest.approx(exact, rel=2e-3, abs=1e-9)
 
 
 @pytest.mark.usefixtures("path")
 def test_plate_adds_the_modes_above_the_highest() -> None:
     frequency = np.linspace(22, 708, 2000)
-    exact = thud.mobility(PLATE, frequency)
-    given = thud.mobility(FLOOR, frequency)
+    exact = thud.mobility(PLATE, frequency).values
+    given = thud.mobility(FLOOR, frequency).values
     # The modes end at 800 Hz: up to half of it, and above.
     for low, high, error in ((22, 355, 0.1), (355, 708, 0.8)):
         band = (frequency >= low) & (frequency < high)
         change = decibels(given.real[band].mean() / exact.real[band].mean())
         assert abs(change) < error, low
     # The static compliance of the higher modes at one position differs from the mean one.
-    higher = exact - thud.mobility(BARE, frequency)
+    higher = exact - thud.mobility(BARE, frequency).values
     below = frequency < 300
     assert (given - exact).imag[below] == pytest.approx(0, abs=0.4 * higher.imag[below].max())
     # A stated compliance replaces the mean one.
     omega = 2 * np.pi * frequency[:100]
     stated = replace(BARE, residual_compliance=2e-8)
-    added = (thud.mobility(stated, frequency[:100]) - thud.mobility(BARE, frequency[:100])).imag
+    soft, bare = (thud.mobility(floor, frequency[:100]).values for floor in (stated, BARE))
+    added = (soft - bare).imag
     assert added == pytest.approx(2e-8 * omega, rel=1e-2)
 
 
@@ -212,7 +213,7 @@ def test_without_a_plate_nothing_stands_for_higher_modes(path: Path) -> None:
 
 def test_masses_and_unequal_spacings_do_not_matter(path: Path) -> None:
     frequency = np.geomspace(20, 700, 50)
-    exact = thud.mobility(FLOOR, frequency)
+    exact = thud.mobility(FLOOR, frequency).values
     x, y = grid(41, 33)
     x[1:-1] += 0.03 * np.sin(np.arange(39))
     modes = slab(800, x, y)
@@ -221,13 +222,13 @@ def test_masses_and_unequal_spacings_do_not_matter(path: Path) -> None:
     thud.write_floor_modes(
         path, modes.frequency, modes.loss_factor, x=x, y=y, shape=scaled, modal_mass=mass
     )
-    assert thud.mobility(FLOOR, frequency) == pytest.approx(exact, rel=0.02, abs=1e-8)
+    assert thud.mobility(FLOOR, frequency).values == pytest.approx(exact, rel=0.02, abs=1e-8)
     # Semicolons, another order of points, comments and line ends change nothing.
     head, points = path.read_text().splitlines()[:4], path.read_text().splitlines()[4:]
-    same = thud.mobility(FLOOR, frequency)
+    same = thud.mobility(FLOOR, frequency).values
     text = "\r\n".join(["# a comment", "", *head, *reversed(points)])
     path.write_text(text.replace(",", ";"), encoding="utf-8-sig")
-    assert thud.mobility(FLOOR, frequency) == pytest.approx(same, rel=1e-12)
+    assert thud.mobility(FLOOR, frequency).values == pytest.approx(same, rel=1e-12)
 
 
 def test_order_of_the_modes_does_not_matter(path: Path) -> None:
@@ -259,10 +260,10 @@ def test_samples_of_floors_share_the_file() -> None:
 
 
 def test_changed_file_changes_the_floor(path: Path) -> None:
-    before = thud.mobility(FLOOR, [30.0])
+    before = thud.mobility(FLOOR, [30.0]).values
     modes = slab(800, *grid(21, 17))
     modes.write(path, loss_factor=2 * modes.loss_factor)
-    assert abs(thud.mobility(FLOOR, [30.0]) / before - 1) > 0.1
+    assert abs(thud.mobility(FLOOR, [30.0]).values / before - 1) > 0.1
 
 
 def test_file_lies_beside_its_case(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

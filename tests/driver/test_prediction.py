@@ -727,7 +727,7 @@ def test_soft_covering_is_a_spring_under_the_source() -> None:
     """Far below the floor's stiffness, the mobility is i omega over the spring with its loss."""
     stiff = thud.Plate(thickness=1.0)
     covered = thud.Plate(thickness=1.0, covering_stiffness=2e5, covering_loss_factor=0.3)
-    added = thud.mobility(covered, [50.0]) - thud.mobility(stiff, [50.0])
+    added = thud.mobility(covered, [50.0]).values - thud.mobility(stiff, [50.0]).values
     assert added == pytest.approx(2j * np.pi * 50 / (2e5 * (1 + 0.3j)), rel=1e-9)
 
 

@@ -103,7 +103,7 @@ def result(case: Chosen) -> str:
     position = {} if floor in AT_A_POINT else SOURCE
     try:
         built = FLOORS[floor][0](**keys, **position)
-        mobility = thud.mobility(built, FREQUENCIES)
+        mobility = thud.mobility(built, FREQUENCIES).values
         impact = thud.solve(thud.Case(model=MODELS[model][0](**options), floor=built))
     except thud.ThudError as error:
         return str(error)
@@ -137,7 +137,7 @@ def test_floors_that_once_were_mistaken_for_each_other() -> None:
         thud.Plate(line_x=(1.0, 2.0), line_y=(3.0,), **SOURCE),
         thud.Plate(line_x=(1.0,), line_y=(2.0, 3.0), **SOURCE),
     ]
-    first, second = (abs(thud.mobility(plate, [30.0])[0]) for plate in plates)
+    first, second = (abs(thud.mobility(plate, [30.0]).values[0]) for plate in plates)
     assert first == pytest.approx(1.57e-7, rel=0.01)
     assert second == pytest.approx(3.42e-7, rel=0.01)
 

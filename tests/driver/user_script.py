@@ -78,12 +78,14 @@ floors += [thud.ModalFloor(file=str(folder / "modes.csv"))]
 plates: list[thud.RectangularFloor] = [thud.LaminateFloor()]
 assert all(isinstance(plate, thud.RectangularFloor) for plate in plates)
 light: thud.Impact = thud.solve(ball, floor=floors[1])
-point: thud.MobilityFit = thud.fit_mobility(([20.0, 30.0, 40.0, 50.0], [1e-5] * 4), order=1)
+measured = thud.Mobility(np.array([20.0, 30.0, 40.0, 50.0]), np.full(4, 1e-5 + 0j))
+measured.save(folder / "mobility.csv")
+point: thud.MobilityFit = thud.fit_mobility(thud.read_mobility(folder / "mobility.csv"), order=1)
 moved: thud.FloorImpact | None = light.on_floor
 assert moved is not None
 impedance: thud.BallImpedance = thud.ball_impedance(light, [1e4, 1e5])
 portions: thud.FloorEnergy = moved.injected_energy("third")
-print(chosen := floors[1].name, thud.mobility(floors[2], [25.0]), moved.difference())
+print(chosen := floors[1].name, thud.mobility(floors[2], [25.0]).values, moved.difference())
 name: thud.FloorName = chosen
 floor, room = thud.Plate(thickness=0.2), thud.Room(volume=40.0)
 below: thud.RoomPrediction = thud.predict_level(flagship, floor, room)

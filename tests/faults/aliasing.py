@@ -56,10 +56,10 @@ def calls() -> dict[str, Call]:
             lambda *given: thud.RoomLevels("room", "octave", *given, 40.0),
         ),
         "ball_impedance": Call([[1e4, 1e5]], lambda floors: thud.ball_impedance(light, floors)),
-        "mobility": Call([[25.0, 100.0]], lambda frequency: thud.mobility(PLATE, frequency)),
+        "mobility": Call([[25.0, 100.0]], lambda frequency: thud.mobility(PLATE, frequency).values),
         "fit_mobility": Call(
             [[20.0, 30.0, 40.0, 50.0], [1e-5, 2e-5, 2e-5, 1e-5]],
-            lambda *table: thud.fit_mobility(table, order=1),
+            lambda *table: thud.fit_mobility(thud.Mobility(*table), order=1),
         ),
         "modal_room": Call(
             [[[1.0, 1.5]], [[1.0, 1.0, 1.0], [2.0, 1.0, 1.2]]],

@@ -66,7 +66,7 @@ def fast_calls(folder: Path) -> Calls:
         "get_bands": lambda: thud.get_bands("third").nominal,
         "quantity": lambda: thud.quantity("8.9 cm"),
         "loss_factors": lambda: thud.loss_factors(thud.FiniteElement(), [50.0, 100.0]),
-        "mobility": lambda: thud.mobility(PLATE, [25.0, 100.0]),
+        "mobility": lambda: thud.mobility(PLATE, [25.0, 100.0]).values,
         "ball_impedance": lambda: str(thud.ball_impedance(light, [1e4, 1e5])),
         "injected_energy": lambda: str(light.on_floor.injected_energy()),  # type: ignore[union-attr]
         "predict_level": lambda: str(thud.predict_level(impact, PLATE, ROOM)),
@@ -92,7 +92,7 @@ def slow_calls(folder: Path) -> Calls:
     force = np.pad(impact.floor_force, 8000)
     force += np.random.default_rng(1).normal(scale=0.5, size=force.size)
     np.savetxt(folder / "record.csv", np.c_[np.arange(force.size) / impact.sample_rate, force])
-    table = ([20.0, 30.0, 40.0, 50.0], [1e-5, 2e-5, 2e-5, 1e-5])
+    table = thud.Mobility([20.0, 30.0, 40.0, 50.0], [1e-5, 2e-5, 2e-5, 1e-5])
     set_study: Any = {"design": {"size": 8}, "parameters": MASS}
     learned = thud.surrogate({"parameters": MASS, "surrogate": {"size": 64}})
     learned.save(folder / "mass.npz")
@@ -195,8 +195,10 @@ def changing_calls(folder: Path) -> dict[str, Callable[[random.Random], object]]
         "sets": lambda chance: thud.solve_many(
             {"height": [chance.uniform(0.5, 1.5) for _ in range(chance.randint(1, 60))]}, threads=2
         ),
-        "mobility": lambda chance: thud.mobility(
-            PLATE, [chance.uniform(20, 200) for _ in range(chance.randint(1, 40))]
+        "mobility": lambda chance: (
+            thud.mobility(
+                PLATE, [chance.uniform(20, 200) for _ in range(chance.randint(1, 40))]
+            ).values
         ),
         "elements": lambda chance: thud.solve(
             thud.Ball(mass=chance.uniform(2.4, 2.6)), model="finite_element", **MESH

@@ -20,6 +20,7 @@ import thud
 from thud.base.bridge import ask
 from thud.base.tables import format_rows
 from thud.floors.mobility_fit import fit_mobility
+from thud.floors.mobility_table import read_mobility
 from thud.floors.survey import rating_table, read_room_levels
 from thud.recordings.config import read_config
 from thud.recordings.table import read_table
@@ -88,7 +89,7 @@ def _read_sets(path: Path, _: random.Random) -> str:
 
 def _read_mobility(path: Path, chance: random.Random) -> str:
     order = chance.choice([2, 4, 8, 8, 8, None if chance.random() < 0.1 else 1])
-    found = fit_mobility(path, order=order)
+    found = fit_mobility(read_mobility(path), order=order)
     said = format_rows(found.rows()) + "".join(map(str, found.notes)) + repr(found)
     ask("check", case=f"&ball / &drop / &model / {found.namelist()}")
     return said if INNER.search(said) else ""
@@ -142,7 +143,7 @@ READERS = {
 def _originals() -> dict[str, str]:
     """Return a table of each kind."""
     f = np.geomspace(10, 1000, 40)
-    y = thud.mobility(thud.Oscillator(), f)
+    y = thud.mobility(thud.Oscillator(), f).values
     depth = np.linspace(0, 0.03, 12)
     force = thud.compress(
         thud.Ball(poisson_ratio=0.49), SMALL, max_deflection=0.03, points=12

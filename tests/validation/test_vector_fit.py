@@ -45,7 +45,7 @@ def test_poles_of_exact_values_are_those_of_scikit_rf(
     seed: int, oracle: Callable[..., None]
 ) -> None:
     values = modal_mobility(seed)
-    floor = thud.fit_mobility((FREQUENCY, values), order=12).floor
+    floor = thud.fit_mobility(thud.Mobility(FREQUENCY, values), order=12).floor
     poles, _ = fit_by_scikit_rf(values)
     expected = np.sort(abs(poles)) / (2 * np.pi)
     oracle(
@@ -62,7 +62,7 @@ def test_noisy_values_are_fitted_as_well_as_by_scikit_rf(seed: int) -> None:
     exact = modal_mobility(seed)
     random = np.random.default_rng(seed)
     values = exact * (1 + 0.03 * random.normal(size=(250, 2)).dot([1, 1j]))
-    found = thud.fit_mobility((FREQUENCY, values), order=12)
+    found = thud.fit_mobility(thud.Mobility(FREQUENCY, values), order=12)
     _, other = fit_by_scikit_rf(values)
     # Each has the error that it makes least: relative here, absolute there.
     absolute = [np.linalg.norm(fit - values) for fit in (found.mobility(FREQUENCY), other)]

@@ -253,8 +253,10 @@ RATE = Command(
 def fit_mobility_table(options: argparse.Namespace) -> int:
     """Fit a measured mobility, print the errors, save the floor; return the exit code."""
     from thud.floors.mobility_fit import fit_mobility
+    from thud.floors.mobility_table import read_mobility
 
-    result = fit_mobility(options.table, quantity=options.quantity, order=options.order)
+    measured = read_mobility(options.table, options.quantity)
+    result = fit_mobility(measured, order=options.order)
     contents = {"measured_mobility.nml": result.namelist().encode()}
     contents |= figures_of(options, {"mobility_fit": result.plot})
     results = results_of(options, result.name, [options.table])

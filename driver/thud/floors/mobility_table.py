@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import unicodedata
 from pathlib import Path
@@ -10,14 +9,18 @@ from typing import TYPE_CHECKING, Literal, cast, get_args
 
 import numpy as np
 
-from thud.base.checks import refuse, refuse_value, require_array, require_choice, shown
+from thud.base.checks import refuse, require_choice, shown
+from thud.base.errors import InputError
 from thud.base.units import size_of
+from thud.floors.mobility import Mobility
 from thud.recordings.formats import guarded
 from thud.recordings.formats.universal import FORCES, SAME_UNIT, DataSet, read_data_sets
 from thud.recordings.table import read_table
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    import os
+
+    from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
 
@@ -53,51 +56,37 @@ _UNITS = {"mobility": "m/(Ns)", "accelerance": "m/(Ns2)", "receptance": "m/N"}
 _FURTHER_UNITS = {"frequency": "Hz", "phase": "deg"}
 
 
-def read_mobility(
-    table: str | os.PathLike[str] | tuple[ArrayLike, ArrayLike], quantity: Quantity | None
-) -> tuple[str, Array, NDArray[np.complex128]]:
-    """Return name, frequencies above 0 Hz and mobilities, m/(N s), of a file or a tuple.
+def read_mobility(path: str | os.PathLike[str], quantity: Quantity | None = None) -> Mobility:
+    """Read a measured mobility, accelerance or receptance; the line at 0 Hz is left out.
 
-    `quantity` is that of the table, by default what the file states, or mobility. Raise InputError
-    if the table is invalid; the message names the file, and the line, column or argument.
+    Parameters
+    ----------
+    path
+        A table with the columns ``frequency``, Hz, ``real`` and ``imaginary`` (or ``magnitude`` and
+        ``phase``, degrees), in SI units or those of its titles, or a universal file with a
+        frequency response (data set 58).
+    quantity
+        ``"mobility"``, m/(N s), ``"accelerance"``, 1/kg, or ``"receptance"``, m/N; by default what
+        the file states, or ``"mobility"``.
+
+    Raises
+    ------
+    InputError
+        If the file is invalid; the message names it, and the line, column or argument.
     """
     if quantity is not None:
         require_choice("quantity", quantity, get_args(Quantity))
-    if isinstance(table, tuple):
-        label = "measurement"
-        frequency, values = _checked(table)
-    elif not isinstance(table, str | os.PathLike):
-        refuse_value("table", table, "a file, or a tuple of frequencies, Hz, and complex values")
-    else:
-        label = f"{table}"
-        frequency, values, stated = _read_file(Path(table))
-        if quantity and stated and quantity != stated:
-            refuse(f"{table}: quantity = {quantity!r}, but the file holds {stated!r}", repr(stated))
-        quantity = quantity or stated
+    file = Path(path)
+    frequency, values, stated = _read_file(file)
+    if quantity and stated and quantity != stated:
+        refuse(f"{path}: quantity = {quantity!r}, but the file holds {stated!r}", repr(stated))
     # The value at 0 Hz has no phase.
     frequency, values = frequency[frequency != 0], values[frequency != 0]
-    values = values * (2j * np.pi * frequency) ** _POWERS[quantity or "mobility"]
-    if not (is_valid := np.isfinite(values) & (values != 0)).all():
-        first = is_valid.argmin()
-        problem = "not finite" if values[first] else "0"
-        refuse(f"{label}: the value at {frequency[first]:g} Hz is {problem}", "finite, not 0")
-    return label, frequency, values
-
-
-def _checked(table: tuple[ArrayLike, ...]) -> tuple[Array, NDArray[np.complex128]]:
-    """Return the frequencies and complex values of a tuple after a check."""
-    if len(table) != 2:  # noqa: PLR2004 - frequencies and values
-        refuse(f"table is a tuple of {len(table)}", "frequencies, Hz, and complex values")
-    frequency = require_array("frequency", table[0], (1,), "iuf")
-    values = require_array("values", table[1], (1,))
-    if values.size and values.dtype.kind not in "iufc":
-        refuse("values are not numbers", "complex numbers")
-    if frequency.shape != values.shape:
-        refuse(
-            f"frequencies of shape {frequency.shape} and values of shape {values.shape}",
-            "one value for each frequency",
-        )
-    return frequency, values.astype(complex)
+    values = values * (2j * np.pi * frequency) ** _POWERS[quantity or stated or "mobility"]
+    try:
+        return Mobility(frequency, values, file.name)
+    except InputError as error:
+        raise error.within(path) from error
 
 
 def _read_file(path: Path) -> tuple[Array, NDArray[np.complex128], Quantity | None]:

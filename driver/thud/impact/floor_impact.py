@@ -7,20 +7,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base._schema import FloorOptions
 from thud.base.bridge import ask
-from thud.base.checks import require_choice, require_kind, require_pair
+from thud.base.checks import require_choice, require_pair
 from thud.base.display import column_rows
 from thud.base.immutable import Immutable
 from thud.case.case import Case, case_text
 from thud.impact.impact import Impact
-from thud.level.levels import BANDWIDTHS, finite_array, force_exposure_levels
+from thud.level.levels import BANDWIDTHS, force_exposure_levels
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import NDArray
 
-    from thud.base._schema import BandSet
+    from thud.base._schema import BandSet, FloorOptions
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,40 +145,3 @@ class FloorImpact(Impact):
         from thud.plot.floor_figures import draw_floor
 
         return draw_floor(self)
-
-
-def mobility(
-    floor: FloorOptions, frequency: ArrayLike, point: tuple[float, float] | None = None
-) -> NDArray[np.complex128]:
-    """Return the mobility of a floor: velocity, at the source or a point, divided by the force.
-
-    Parameters
-    ----------
-    floor
-        An object of `Rigid`, `InfinitePlate`, `Oscillator`, `Plate` or another floor.
-    frequency : array_like, shape (n,)
-        Frequencies, Hz.
-    point
-        Position along length and width of a rectangular floor, m; None: at the source.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Complex mobilities, m/(N s).
-
-    Raises
-    ------
-    InputError
-        If a key of the floor is out of range, the point is outside, or the floor has no sides.
-
-    Examples
-    --------
-    >>> import thud
-    >>> thud.mobility(thud.InfinitePlate(resistance=1600.0), [31.5]).real
-    array([0.000625])
-    """
-    require_kind("floor", floor, FloorOptions)
-    frequencies = np.atleast_1d(finite_array("frequency", frequency, (0, 1)))
-    points = {} if point is None else {"point": np.array(require_pair("point", point))}
-    answer = ask("mobility", case=case_text(Case(floor=floor)), frequency=frequencies, **points)
-    return np.asarray(answer["real"] + 1j * answer["imaginary"])

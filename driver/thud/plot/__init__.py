@@ -33,8 +33,9 @@ from thud.plot.fit_figures import draw_fit as draw_fit, target_and_fit as target
 from thud.plot.floor_figures import (
     ball_impedances as ball_impedances,
     draw_floor as draw_floor,
+    draw_mobility as draw_mobility,
+    draw_mobility_fit as draw_mobility_fit,
     floor_mobilities as floor_mobilities,
-    mobility_fit as mobility_fit,
     plate_modes as plate_modes,
 )
 from thud.plot.impact_figures import (

@@ -13,7 +13,7 @@ from thud.base._schema import FloorOptions
 from thud.base.bridge import ask
 from thud.base.checks import refuse, require_kind, require_mapping, require_whole
 from thud.case.case import Case, case_text
-from thud.impact.floor_impact import mobility
+from thud.floors.mobility import mobility
 from thud.level.levels import BANDWIDTHS, get_bands, low_pass
 from thud.plot.impact_figures import TIME_LABEL
 from thud.plot.style import (
@@ -25,9 +25,11 @@ from thud.plot.style import (
     curve_style,
     empty_axes,
     escape_label,
+    finish,
     frequency_axis,
     legend_above,
     new_figure,
+    own_or,
     own_style,
     panel_grid,
 )
@@ -40,6 +42,7 @@ if TYPE_CHECKING:
 
     from thud.case.constructions import Layer
     from thud.floors.impedance import BallImpedance
+    from thud.floors.mobility import Mobility
     from thud.floors.mobility_fit import MobilityFit
     from thud.impact.floor_impact import FloorImpact
 
@@ -138,7 +141,10 @@ def draw_floor(impact: FloorImpact) -> Figure:
     energy.sharex(change)
     change.tick_params(labelbottom=False)
     band_axis(energy, THIRDS)
-    _draw_mobility(mobilities, impact.floor)
+    bands = get_bands(THIRDS)
+    low, high = bands.lower[0], bands.upper[-1]
+    frequency = np.geomspace(low, high, int(_DENSITY * np.log2(high / low)))
+    _add_mobility(mobilities, mobility(impact.floor, frequency))
     figure.align_ylabels()
     legend_above(history, motion, mobilities, title="Forces are low-passed at 1.25 kHz")
     return figure
@@ -162,18 +168,23 @@ def _draw_histories(history: Axes, motion: Axes, impact: FloorImpact) -> None:
     history.margins(x=0)
 
 
-def _draw_mobility(axes: Axes, floor: FloorOptions) -> None:
-    bands = get_bands(THIRDS)
-    low, high = bands.lower[0], bands.upper[-1]
-    frequency = np.geomspace(low, high, int(_DENSITY * np.log2(high / low)))
-    values = mobility(floor, frequency)
+@own_style()
+def draw_mobility(mobility: Mobility, ax: Axes | None = None) -> Figure:
+    """Draw magnitude and real part of a mobility against frequency."""
+    axes = own_or(ax, 2.4)
+    _add_mobility(axes, mobility)
+    return finish(axes, ax)
+
+
+def _add_mobility(axes: Axes, drawn: Mobility) -> None:
     # A thin line on a thick one: the mobility of an infinite plate is real.
-    axes.loglog(frequency, abs(values), label="$|Y|$", color="0.7", linewidth=2.4)
+    axes.loglog(drawn.frequency, abs(drawn.values), label="$|Y|$", color="0.7", linewidth=2.4)
     axes.loglog(
-        frequency, values.real, label=r"$\mathrm{Re}\,Y$", color="black", linewidth=0.8,
+        drawn.frequency, drawn.values.real, label=r"$\mathrm{Re}\,Y$", color="black",
+        linewidth=0.8,
     )  # fmt: skip
     axes.set_ylabel("Mobility $Y$,\nm/(N s)")
-    axes.set_xlim(low, high)
+    axes.set_xlim(drawn.frequency[0], drawn.frequency[-1])
     frequency_axis(axes)
 
 
@@ -228,7 +239,7 @@ def floor_mobilities(floors: Mapping[str, FloorOptions]) -> Figure:
         # Resonances are as narrow as dashes: markers distinguish the curves instead.
         style = curve_style(i, 4.5) | {"linestyle": "-", "linewidth": 0.8}
         axes.loglog(
-            frequency, np.abs(mobility(floor, frequency)), label=escape_label(name),
+            frequency, np.abs(mobility(floor, frequency).values), label=escape_label(name),
             markevery=(30 * i, 225), **style,
         )  # fmt: skip
     frequency_axis(axes)
@@ -238,19 +249,20 @@ def floor_mobilities(floors: Mapping[str, FloorOptions]) -> Figure:
 
 
 @own_style()
-def mobility_fit(fit: MobilityFit) -> Figure:
+def draw_mobility_fit(fit: MobilityFit) -> Figure:
     """Draw magnitude and phase of measurement and fit against frequency."""
     figure = new_figure(3.6)
     upper, lower = figure.subplots(2, sharex=True)
-    frequency = np.geomspace(fit.frequency[0], fit.frequency[-1], 2000)
+    measured = fit.measured
+    fitted = mobility(fit.floor, np.geomspace(measured.frequency[0], measured.frequency[-1], 2000))
     label = f"fitted: relative error {100 * fit.error:.2g} %"
-    for x, values, style in (
-        (fit.frequency, fit.measured, {"linestyle": "none", "marker": ".", "color": "0.55",
-                                       "markersize": 2.5, "label": "measured"}),
-        (frequency, fit.mobility(frequency), {"color": COLORS[0], "label": label}),
+    for drawn, style in (
+        (measured, {"linestyle": "none", "marker": ".", "color": "0.55", "markersize": 2.5,
+                    "label": "measured"}),
+        (fitted, {"color": COLORS[0], "label": label}),
     ):  # fmt: skip
-        upper.loglog(x, abs(values), **style)
-        lower.plot(x, np.degrees(np.angle(values)), **style)
+        upper.loglog(drawn.frequency, abs(drawn.values), **style)
+        lower.plot(drawn.frequency, np.degrees(np.angle(drawn.values)), **style)
     upper.set_ylabel("Mobility, m/(N s)")
     lower.set_ylabel("Phase, degrees")
     lower.set_yticks([-90, 0, 90])
@@ -273,7 +285,7 @@ def ball_impedances(
     """
     figure, axes = empty_axes(2.8)
     impedances = {
-        name: (_FREQUENCIES, 1 / np.abs(mobility(floor, _FREQUENCIES)))
+        name: (_FREQUENCIES, 1 / np.abs(mobility(floor, _FREQUENCIES).values))
         for name, floor in floors.items()
     }
     add_curves(axes, impedances, linewidth=0.8)

@@ -96,6 +96,22 @@ def empty_axes(height: float) -> tuple[Figure, Axes]:
     return figure, figure.add_subplot()
 
 
+def own_or(ax: Axes | None, height: float) -> Axes:
+    """Return the axes of a user, or those of a new figure of column width, inches high."""
+    return empty_axes(height)[1] if ax is None else ax
+
+
+def finish(axes: Axes, ax: Axes | None, title: str = "") -> Figure:
+    """Add the legend, above an own figure or inside the axes of a user; return the figure."""
+    if ax is None:
+        legend_above(axes, title=title)
+    elif axes.get_legend_handles_labels()[1]:
+        axes.legend(title=title or None)
+    figure = axes.get_figure(root=True)
+    assert figure is not None  # noqa: S101 - for the type checker
+    return figure
+
+
 def panel_grid(
     count: int, columns: int, height: float, *, width: float = WIDTH, shared: bool = False
 ) -> tuple[Figure, list[Axes]]:
