@@ -60,7 +60,7 @@ def calls(folder: Path) -> list[tuple[Callable[..., Any], dict[str, Any]]]:
         (calibrate, {"record": record, "force": 100.0, "channel": 2, "unit": "V"}),
         (thud.force_exposure_levels, columns),
         (thud.standardized_level, {"level": [50.0], "reverberation_time": [0.5], "volume": 50.0}),
-        (thud.blocked_force, {"source": impact, "rate": 48e3}),
+        (thud.blocked_force, {"source": impact, "drop": 1}),
         (thud.listen, {"predictions": thud.predict_level(on_floor)}),
         (thud.modal_room, {"source": on_floor, "max_frequency": 60.0}),
         (thud.compress, {"points": 5}),

@@ -30,8 +30,6 @@ PROCESSING = {
     "hum_removed": "hum of {frequency:g} Hz with an amplitude of {value:.3g} {unit} was removed",
     "tone_removed": "a tone of {frequency:.4g} Hz with an amplitude of {value:.3g} {unit} was "
     "removed",
-    "resampled": "resampled from {value:g} {unit}, band-limited; to {high:g} {unit} the spectrum "
-    "has changed by up to {change:.1e} of its maximum",
     "noise_remains": "noise of {value:.3g} {unit} remains",
     "plate_corrected": "force plate: resonance of {value:.5g} {unit}, quality {quality:g}, "
     "corrected up to {high:.5g} {unit}; noise there times {gain:.2g}",

@@ -233,7 +233,7 @@ def run_export(options: argparse.Namespace) -> int:
     if not chosen:
         refuse("export: no format is chosen", ", ".join(f"--{kind}" for kind in KINDS))
     source = _read_source(options.source, options.config)
-    force = force_files.blocked_force(source, drop=options.drop, rate=options.rate)
+    force = force_files.blocked_force(source, drop=options.drop)
     formats = (force_files.EXPORTS[kind] for kind in chosen)
     contents = {f"{force.name}{ending}": make(force) for ending, make in formats}
     inputs = options.source, options.config
@@ -258,7 +258,6 @@ EXPORT = Command(
         files("source", "CASE.nml|RECORDING", "namelist file, or recording", "case", "recording"),
         *(flag(f"--{kind}", meaning) for kind, meaning in KINDS.items()),
         *output("the files (default: outputs/<name>_export)"),
-        option("--rate", "HZ", "resample to this rate", type=number),
         option("--drop", "N", "index of the drop in a recording (default: 1)", type=int, default=1),
         option("--config", "LAB.toml", "configuration of a recording", type=file_of("TOML file")),
         QUIET,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from thud.base._schema import JoistFloor
 from thud.base.checks import refuse
-from thud.base.files import is_one_of, replace_file
+from thud.base.files import is_one_of
 from thud.base.tables import format_rows
 from thud.case.case import read_case
 from thud.cli.command import (
@@ -191,11 +191,11 @@ def listen_to_cases(options: argparse.Namespace) -> int:
     floors = _read_floors(options)
     if is_one_of(path, floors.inputs):
         refuse(f"{path} is an input, which is never replaced", "another file")
-    chosen = {name: getattr(options, name) for name in ("position", "pause", "repeat", "seed")}
+    chosen = {name: getattr(options, name) for name in ("position", "pause", "seed")}
     sound = listen(floors.compare(options).predictions, **chosen)
-    print_notes(sound.warnings)
+    print_notes(note.message for note in sound.notes)
     path.parent.mkdir(parents=True, exist_ok=True)
-    replace_file(path, sound.wav())
+    sound.save(path)
     if not options.quiet:
         print_results(format_rows(sound.rows()))
         print_results(f"Full scale: {sound.full_scale:g} Pa\nThe sound is {NOTE}.")
@@ -213,8 +213,6 @@ LISTEN = Command(
                  help="numbers of positions, from 1 (default: levels nearest to the mean)"),
         option("--pause", "S", "time between the end of a sound and the next impact (default: 1 s)",
                type=number, default=1.0),
-        option("--repeat", "N", "repetitions of all floors in their order (default: 1)",
-               type=int, default=1),
         option("--seed", "N", "seed of the noise (default: 0)", type=int, default=0),
         QUIET,
     ),

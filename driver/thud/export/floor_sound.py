@@ -14,6 +14,7 @@ from scipy.special import exprel
 
 from thud.base._schema import RATED_BANDS
 from thud.base.checks import refuse_value, require_whole
+from thud.base.display import Tabulated
 from thud.base.immutable import Immutable
 from thud.base.note import Note
 from thud.floors.modal_room import positions_below
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from numpy.typing import NDArray
+
+    from thud.base.display import Columns
 
     Array = NDArray[np.float64]
 
@@ -94,7 +97,7 @@ class SoundLevels(Immutable):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FloorSound(Immutable):
+class FloorSound(Tabulated):
     """Sound of one impact in the room below a floor.
 
     That of the first `RoomPrediction.n_modal` bands is the sound of the modes of floor and room,
@@ -135,6 +138,11 @@ class FloorSound(Immutable):
         return self.prediction.notes + (note,) * (deviation > MAX_DEVIATION)
 
     @property
+    def place(self) -> str:
+        """Numbers of the positions of ball and microphone; a dash without modal bands."""
+        return "-" if self.position is None else "{}, {}".format(*self.position)
+
+    @property
     def description(self) -> str:
         """Bands of the modal sound and of the noise."""
         bands, n_modal = RATED_BANDS[BANDS], self.prediction.n_modal
@@ -142,11 +150,19 @@ class FloorSound(Immutable):
         if self.position is not None:
             parts.append(
                 f"modes of floor and room from {bands[0]:g} to {bands[n_modal - 1]:g} Hz at "
-                "ball position {} and microphone position {}".format(*self.position)
+                f"the positions of ball and microphone {self.place}"
             )
         if n_modal < len(bands):
             parts.append(f"noise from {bands[n_modal]:g} to {bands[-1]:g} Hz")
         return ", ".join(parts)
+
+    def columns(self) -> Columns:
+        """Return the levels in one-third-octave bands, and those that they should have."""
+        return {
+            "band, Hz": (self.prediction.frequency, "g"),
+            "sound, dB": (self.level.third, ".1f"),
+            "reference, dB": (self.reference.third, ".1f"),
+        }
 
 
 def new_floor_sound(

@@ -5,8 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import math
-from dataclasses import dataclass, replace
-from fractions import Fraction
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -14,29 +13,25 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base.bridge import version
-from thud.base.checks import (
-    refuse,
-    require_choice,
-    require_kind,
-    require_number,
-    require_whole,
-)
+from thud.base.checks import refuse, require_kind, require_whole
 from thud.base.extras import library
 from thud.base.files import replace_file
-from thud.base.immutable import Immutable
 from thud.base.note import Note
 from thud.base.tables import csv_text
 from thud.case.case import case_text
 from thud.export.wav import wav_file
+from thud.impact.curve import Curve
 from thud.level.assessment import ImpactOrRecording
-from thud.level.levels import RECORDED_BAND
 from thud.recordings.recording import Recording
 
 if TYPE_CHECKING:
     import os
 
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
+    from thud.base.display import Columns
     from thud.impact.impact import Impact
     from thud.recordings.recording import ImpactResult
 
@@ -45,19 +40,13 @@ CONVENTION = (
     "F(f) = integral of F(t) exp(-i 2 pi f t) dt, N s, t = 0 at first touch; two-sided spectrum "
     "at f >= 0: F(-f) is the complex conjugate, the energy of a band is 2 * integral of |F|^2 df"
 )
-# Minimum and maximum rate of resampled forces, Hz.
-RATES = (2500.0, 1e6)
-# Maximum numerator and denominator of the ratio of rates.
-MAX_RATIO = 1000
-# Half the length of the filter of scipy.signal.resample_poly, in samples of the lower rate.
-HALF_LENGTH = 10
 # Maximum lengths of lines and names in a universal file.
 UFF_LINE = 80
 UFF_NAME = 10
 
 
 @dataclass(frozen=True, eq=False)
-class BlockedForce(Immutable):
+class BlockedForce(Curve):
     """Force of one drop on a rigid floor with its origin, for other programs.
 
     Attributes
@@ -125,33 +114,49 @@ class BlockedForce(Immutable):
         texts = (line.encode("utf-8", "replace").decode() for line in lines)
         return tuple(" ".join(text.split()) for text in texts)
 
-    def save(self, path: str | os.PathLike[str], kind: str = "csv") -> None:
+    def __repr__(self) -> str:
+        """Return name, peak and duration."""
+        duration = 1e3 * len(self.force) / self.sample_rate
+        return f"<BlockedForce {self.name}: peak {self.force.max():.0f} N, {duration:.1f} ms>"
+
+    def columns(self) -> Columns:
+        """Return the force over time since first touch."""
+        return {"time, s": (self.time, ".5f"), "force, N": (self.force, "z.1f")}
+
+    def plot(self, ax: Axes | None = None) -> Figure:
+        """Draw the force over time since first touch, in a new figure or the stated axes."""
+        from thud.plot.impact_figures import draw_blocked_force
+
+        return draw_blocked_force(self, ax)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
         """Write the force to a file, replacing an existing file.
 
         Parameters
         ----------
         path
-            Path of the file.
-        kind
-            ``"wav"``, ``"csv"``, ``"uff"``, ``"mat"`` or ``"spectrum"``.
+            Path of the file, which ends with ``.wav``, ``.csv``, ``.uff`` or ``.mat``; a table of
+            the spectrum ends with ``_spectrum.csv``.
 
         Raises
         ------
         InputError
-            If the format cannot represent the force, or `path` is the recording of the force.
+            If the ending is not known, the format cannot represent the force, or `path` is the
+            recording of the force.
         OSError
             If the file cannot be written.
         """
-        require_choice("kind", kind, EXPORTS)
         file = Path(path)
+        kinds = [kind for kind, (ending, _) in EXPORTS.items() if file.name.endswith(ending)]
+        if not kinds:
+            endings = ", ".join(ending for ending, _ in EXPORTS.values())
+            refuse(f"{path}: this ending is not known", endings)
         if file.is_file() and hashlib.sha256(file.read_bytes()).hexdigest() == self.checksum:
             refuse(f"{path} is the recording of the force", "another path")
-        replace_file(path, EXPORTS[kind][1](self))
+        replace_file(path, EXPORTS[kinds[-1]][1](self))
 
 
-def blocked_force(
-    source: ImpactResult, *, drop: int = 1, rate: float | None = None
-) -> BlockedForce:
+def blocked_force(source: ImpactResult, *, drop: int = 1) -> BlockedForce:
     """Return the assessed force of a drop; that of a recording is zero before and after contact.
 
     Parameters
@@ -160,21 +165,17 @@ def blocked_force(
         Impact or recording.
     drop
         Number of the drop in a recording, from 1.
-    rate
-        Samples per second of the result, Hz; by default the rate of the source.
 
     Raises
     ------
     InputError
-        If the drop does not exist, or the rate is not possible.
+        If the drop does not exist.
     """
     require_kind("source", source, ImpactOrRecording)
     if isinstance(source, Recording):
-        force = _of_recording(source, drop)
-    else:
-        require_whole("drop", drop, 1, 1)
-        force = _of_impact(source)
-    return force if rate is None else _resampled(force, rate)
+        return _of_recording(source, drop)
+    require_whole("drop", drop, 1, 1)
+    return _of_impact(source)
 
 
 def _of_impact(impact: Impact) -> BlockedForce:
@@ -214,34 +215,6 @@ def _of_recording(recording: Recording, number: int) -> BlockedForce:
     )
 
 
-def _resampled(original: BlockedForce, rate: float) -> BlockedForce:
-    """Return a force resampled at a rate, band-limited to half the lower rate."""
-    from scipy.signal import resample_poly
-
-    require_number("rate", rate, *RATES, "Hz")
-    ratio = Fraction(float(rate) / original.sample_rate).limit_denominator(MAX_RATIO)
-    up, down = ratio.numerator, ratio.denominator
-    if up > MAX_RATIO or abs(original.sample_rate * up / down - rate) > 1e-9 * rate:
-        refuse(
-            f"rate = {rate:g} Hz divided by {original.sample_rate:g} Hz is not a simple fraction",
-            f"numerator and denominator up to {MAX_RATIO}",
-        )
-    # The filter extends the force at both ends.
-    margin = math.ceil(HALF_LENGTH * max(1.0, down / up)) + 1
-    force = resample_poly(np.pad(original.force, margin), up, down)
-    start = original.start - margin / original.sample_rate
-    result = replace(original, force=force, sample_rate=rate, start=start)
-    (old_frequency, old), (new_frequency, new) = original.spectrum(), result.spectrum()
-    band = np.arange(1, min(RECORDED_BAND, old_frequency[-1], new_frequency[-1]))
-    old, new = np.interp(band, old_frequency, old), np.interp(band, new_frequency, new)
-    error = float(np.abs(new - old).max() / np.abs(old).max())
-    note = Note(
-        "resampled", value=original.sample_rate, high=RECORDED_BAND, unit="Hz",
-        others={"change": error},
-    )  # fmt: skip
-    return replace(result, notes=(*original.notes, note))
-
-
 def _wav(force: BlockedForce) -> bytes:
     """Return a WAV file of 32-bit floats, fractions of full scale, with the header as its comment.
 
@@ -252,7 +225,7 @@ def _wav(force: BlockedForce) -> bytes:
     if rate != force.sample_rate:
         refuse(
             f"{force.name}: WAV cannot hold a sample rate of {force.sample_rate!r} Hz",
-            "whole numbers of Hz; rate = a whole number resamples the force",
+            "whole numbers of Hz, such as &sampling: sample_rate of a case",
         )
     peak = float(np.abs(force.force).max())
     scale = 2.0 ** math.ceil(math.log2(peak)) if peak > 0 else 1.0

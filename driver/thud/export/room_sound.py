@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +15,7 @@ from thud.base.checks import (
     require_number,
     require_whole,
 )
-from thud.base.display import Displayed
+from thud.base.display import Tabulated
 from thud.base.files import replace_file
 from thud.export.floor_sound import REFERENCE_PRESSURE, SAMPLE_RATE, FloorSound, new_floor_sound
 from thud.export.wav import wav_file
@@ -26,14 +26,18 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Mapping
 
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
+
+    from thud.base.display import Columns
+    from thud.base.note import Note
 
     Array = NDArray[np.float64]
 
-# Maximum duration of a file and of a pause, s, and number of repetitions.
+# Maximum duration of a file and of a pause, s.
 MAX_DURATION = 600.0
 MAX_PAUSE = 60.0
-MAX_REPEAT = 100
 NOTE = (
     "computed from a prediction, not recorded: no measured room, no furniture, no listener's head; "
     "bands from 50 to 630 Hz only"
@@ -41,13 +45,13 @@ NOTE = (
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RoomSound(Displayed):
+class RoomSound(Tabulated):
     """Sounds of impacts in the rooms below floors, one after the other.
 
     Attributes
     ----------
     sounds : tuple of FloorSound
-        The sound of each floor.
+        The sound of each floor, in their order.
     pressure : ndarray, shape (n_sample,)
         Sound pressure, Pa.
     sample_rate : int
@@ -56,8 +60,6 @@ class RoomSound(Displayed):
         Sound pressure of a full-scale sample, Pa; the same for all floors.
     starts : ndarray, shape (n_impact,)
         Times of the impacts, s.
-    order : tuple of str
-        Names of the floors of the impacts.
     """
 
     sounds: tuple[FloorSound, ...]
@@ -65,37 +67,41 @@ class RoomSound(Displayed):
     sample_rate: int
     full_scale: float
     starts: Array
-    order: tuple[str, ...]
 
     @property
-    def warnings(self) -> tuple[str, ...]:
-        """Sentences on the validity of the sounds, with the names of the floors."""
-        return tuple(f"{sound.name}: {note}" for sound in self.sounds for note in sound.notes)
+    def notes(self) -> tuple[Note, ...]:
+        """Warnings on the validity of the sounds; their subjects are the names of the floors."""
+        return tuple(replace(n, subject=sound.name) for sound in self.sounds for n in sound.notes)
 
     @property
     def comment(self) -> str:
         """Comment in the file: full scale, contents and limits."""
-        impacts = "; ".join(
-            f"{start:.3f} s {name}" for start, name in zip(self.starts, self.order, strict=True)
-        )
+        pairs = zip(self.starts, self.sounds, strict=True)
+        impacts = "; ".join(f"{start:.3f} s {sound.name}" for start, sound in pairs)
         sounds = "; ".join(f"{sound.name}: {sound.description}" for sound in self.sounds)
         return (
             f"Sound pressure, full scale {self.full_scale:g} Pa. Impacts: {impacts}. {sounds}. "
             f"The sound is {NOTE}."
         )
 
-    def rows(self) -> list[tuple[str, ...]]:
-        """Return the header and a row of text for each impact: levels, and their deviations."""
-        octaves = [f"{f:g} Hz, dB" for f in get_bands("octave").nominal[1:]]
-        sounds = {sound.name: sound for sound in self.sounds}
-        rows = []
-        for start, name in zip(self.starts, self.order, strict=True):
-            sound = sounds[name]
-            pairs = zip(sound.level.shown, sound.reference.shown, strict=True)
-            cells = [f"{level:.1f} ({level - reference:+z.1f})" for level, reference in pairs]
-            place = "-" if sound.position is None else "{}, {}".format(*sound.position)
-            rows.append((f"{start:.2f}", name, place, *cells))
-        return [("start, s", "floor", "ball, microphone", *octaves, "L_AFmax, dB"), *rows]
+    def columns(self) -> Columns:
+        """Return the levels of the sounds, and in what they deviate most from the predictions."""
+        levels = np.array([sound.level.shown for sound in self.sounds]).T
+        titles = [*(f"{f:g} Hz, dB" for f in get_bands("octave").nominal[1:]), "L_AFmax, dB"]
+        deviations = [sound.level.deviation(sound.reference) for sound in self.sounds]
+        return {
+            "start, s": (self.starts, ".2f"),
+            "floor": ([sound.name for sound in self.sounds], ""),
+            "ball, microphone": ([sound.place for sound in self.sounds], ""),
+            **{title: (row, ".1f") for title, row in zip(titles, levels, strict=True)},
+            "deviation, dB": (deviations, ".1f"),
+        }
+
+    def plot(self, ax: Axes | None = None) -> Figure:
+        """Draw the sound pressure over time, in a new figure or the stated axes."""
+        from thud.plot.room_figures import draw_sound
+
+        return draw_sound(self, ax)
 
     def wav(self) -> bytes:
         """Return the content of the WAV file, of 24 bit; raise InputError without soundfile."""
@@ -120,7 +126,6 @@ def listen(
     *,
     position: tuple[int, int] | None = None,
     pause: float = 1.0,
-    repeat: int = 1,
     seed: int = 0,
 ) -> RoomSound:
     """Return the sound of impacts in the rooms below floors.
@@ -139,8 +144,6 @@ def listen(
         those whose levels in the modal bands are nearest to the mean of all positions.
     pause
         Time from the end of a sound to the next impact, s, 0 to 60.
-    repeat
-        Number of repetitions of all floors in their order, 1 to 100.
     seed
         Seed of the noise, which is the same for all floors.
 
@@ -150,7 +153,6 @@ def listen(
         If an argument is out of range, or the file would last longer than 600 s.
     """
     require_number("pause", pause, 0.0, MAX_PAUSE, "s")
-    require_whole("repeat", repeat, 1, MAX_REPEAT)
     require_whole("seed", seed, 0, 2**32 - 1)
     named = {"floor": predictions} if isinstance(predictions, RoomPrediction) else predictions
     require_mapping("predictions", named, "objects of RoomPrediction")
@@ -158,12 +160,11 @@ def listen(
         require_kind(name, prediction, RoomPrediction)
     sounds = [new_floor_sound(*item, position, seed) for item in named.items()]
     gap = round(pause * SAMPLE_RATE)
-    ordered = sounds * repeat
-    lengths = [len(sound.pressure) + gap for sound in ordered]
+    lengths = [len(sound.pressure) + gap for sound in sounds]
     duration = (sum(lengths) - gap) / SAMPLE_RATE
     if duration > MAX_DURATION:
         refuse(f"the sound lasts {duration:.0f} s", f"up to {MAX_DURATION:g} s")
-    pressure = np.concatenate([np.append(sound.pressure, np.zeros(gap)) for sound in ordered])
+    pressure = np.concatenate([np.append(sound.pressure, np.zeros(gap)) for sound in sounds])
     pressure = pressure[: len(pressure) - gap]
     return RoomSound(
         sounds=tuple(sounds),
@@ -171,7 +172,6 @@ def listen(
         sample_rate=SAMPLE_RATE,
         full_scale=_full_scale(float(abs(pressure).max())),
         starts=np.cumsum([0, *lengths[:-1]]) / SAMPLE_RATE,
-        order=tuple(sound.name for sound in ordered),
     )
 
 

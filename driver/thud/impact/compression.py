@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 from thud.base._schema import Ball, Compression
 from thud.base.bridge import ask, without_units
-from thud.base.display import Tabulated
 from thud.case.case import Case, case_text, new_model
+from thud.impact.curve import Curve
 
 if TYPE_CHECKING:
     import numpy as np
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class CompressionCurve(Tabulated):
+class CompressionCurve(Curve):
     """Force and deflection of a ball between two rigid plates without friction.
 
     Attributes
@@ -48,16 +49,11 @@ class CompressionCurve(Tabulated):
         """Return the columns of ``compression.csv``."""
         return {"deflection, m": (self.deflection, ".4g"), "force, N": (self.force, ".2f")}
 
-    def rows(self) -> list[tuple[str, ...]]:
-        """Return the header and about ten rows of text."""
-        header, *rows = super().rows()
-        return [header, *rows[:: max(1, len(rows) // 10)]]
-
-    def plot(self) -> Figure:
-        """Return a figure of the force against the deflection."""
+    def plot(self, ax: Axes | None = None) -> Figure:
+        """Draw the force against the deflection, in a new figure or the stated axes."""
         from thud.plot.ball_figures import compression
 
-        return compression({"": self})
+        return compression({"": self}, ax)
 
 
 def compress(

@@ -23,8 +23,10 @@ from thud.plot.style import (
     add_colorbar,
     add_curves,
     empty_axes,
+    finish,
     frequency_axis,
     legend_above,
+    own_or,
     own_style,
     panel_grid,
 )
@@ -293,13 +295,15 @@ def draw_material(impact: Impact) -> Figure | None:
 
 
 @own_style()
-def compression(curves: Mapping[str, CompressionCurve]) -> Figure:
+def compression(curves: Mapping[str, CompressionCurve], ax: Axes | None = None) -> Figure:
     """Draw forces against the approach of the plates.
 
     Parameters
     ----------
     curves
         Curves by their names in the legend.
+    ax
+        Axes, by default those of a new figure.
 
     Returns
     -------
@@ -314,7 +318,7 @@ def compression(curves: Mapping[str, CompressionCurve]) -> Figure:
     require_mapping("curves", curves, "curves")
     for name, curve in curves.items():
         require_kind(name, curve, CompressionCurve)
-    figure, axes = empty_axes(2.5)
+    axes = own_or(ax, 2.5)
     add_curves(
         axes, {name: (1e3 * curve.deflection, curve.force) for name, curve in curves.items()}
     )
@@ -322,5 +326,4 @@ def compression(curves: Mapping[str, CompressionCurve]) -> Figure:
     axes.set_ylim(bottom=0)
     axes.set_xlabel("Approach of the plates, mm")
     axes.set_ylabel("Force, N")
-    legend_above(axes)
-    return figure
+    return finish(axes, ax)

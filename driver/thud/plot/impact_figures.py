@@ -16,13 +16,16 @@ from thud.impact.contact_time import THRESHOLD
 from thud.level.assessment import octave_limits
 from thud.level.levels import low_pass
 from thud.plot.style import (
+    COLORS,
     add_curves,
     add_levels,
     assessed_curves,
     empty_axes,
+    finish,
     legend_above,
     level_label,
     new_figure,
+    own_or,
     own_style,
     tolerance_boxes,
 )
@@ -35,6 +38,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
+    from thud.export.force_files import BlockedForce
     from thud.impact.impact import Impact
     from thud.plot.style import Curve
 
@@ -159,6 +163,16 @@ def common_source(impacts: Mapping[str, Curve], source: LimitsSource | None = No
             "cases and recordings with one source, or the choice of one",
         )
     return sources.pop() if sources else Limits.source
+
+
+@own_style()
+def draw_blocked_force(force: BlockedForce, ax: Axes | None = None) -> Figure:
+    """Draw a force over time since first touch."""
+    axes = own_or(ax, 2.0)
+    axes.plot(1e3 * force.time, 1e-3 * force.force, color=COLORS[0], linewidth=1)
+    axes.set_xlabel(TIME_LABEL)
+    axes.set_ylabel("Force, kN")
+    return finish(axes, ax)
 
 
 @own_style()

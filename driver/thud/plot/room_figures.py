@@ -15,8 +15,11 @@ from thud.plot.style import (
     band_axis,
     curve_style,
     empty_axes,
+    escape_label,
+    finish,
     legend_above,
     new_figure,
+    own_or,
     own_style,
 )
 
@@ -24,6 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from thud.export.room_sound import RoomSound
     from thud.floors.modal_room import ModalRoom
     from thud.floors.prediction import RoomPrediction
     from thud.floors.survey import RoomLevels
@@ -122,6 +126,20 @@ def draw_modal_room(room: ModalRoom) -> Figure:
     axes.set_ylabel(FAST_LEVEL)
     legend_above(axes)
     return figure
+
+
+@own_style()
+def draw_sound(sound: RoomSound, ax: Axes | None = None) -> Figure:
+    """Draw the sound pressure over time, with the floors at the times of their impacts."""
+    axes = own_or(ax, 2.0)
+    axes.plot(np.arange(len(sound.pressure)) / sound.sample_rate, sound.pressure, linewidth=0.4)
+    top = abs(sound.pressure).max()
+    for start, floor in zip(sound.starts, sound.sounds, strict=True):
+        axes.text(start, 1.1 * top, escape_label(floor.name), fontsize="small")
+    axes.set_ylim(-1.05 * top, 1.3 * top)
+    axes.set_xlabel("Time, s")
+    axes.set_ylabel("Sound pressure, Pa")
+    return finish(axes, ax)
 
 
 @own_style()
