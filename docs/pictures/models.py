@@ -22,14 +22,27 @@ from thud.base._schema import (
 )
 from thud.case.case import Case
 from thud.floors.impedance import ball_impedance
+from thud.floors.mobility import mobility
 from thud.impact.compression import compress
 from thud.impact.ensemble import solve_many
-from thud.impact.free_modes import free_modes
+from thud.impact.free_modes import free_modes, loss_factors
 from thud.impact.solve import solve
-from thud.plot.ball_figures import compression, loss_factor, mode_shapes, motion
-from thud.plot.floor_figures import ball_impedances, draw_floor, floor_mobilities
-from thud.plot.impact_figures import force_history, level_changes, levels
-from thud.plot.style import COLORS, WIDTH, new_figure, own_style
+from thud.plot.ball_figures import compression, mode_shapes, motion
+from thud.plot.floor_figures import ball_impedances, draw_floor
+from thud.plot.impact_figures import force_history, levels
+from thud.plot.style import (
+    COLORS,
+    WIDTH,
+    add_curves,
+    add_levels,
+    curve_style,
+    empty_axes,
+    frequency_axis,
+    legend_above,
+    level_label,
+    new_figure,
+    own_style,
+)
 from thud.studies.calibrated_set import MESH, calibrated_set
 
 if TYPE_CHECKING:
@@ -115,6 +128,7 @@ def _draw_fluxes() -> Figure:
     return levels(impacts, "elastic")
 
 
+@own_style()
 def _draw_families() -> Figure:
     """Draw how levels change if one family of modes at a time is quasi-static."""
     static = {f"n = {n} static": [n] for n in range(2, 7)}
@@ -123,9 +137,16 @@ def _draw_families() -> Figure:
         name: solve(model="modal_ball", static_families=families)
         for name, families in static.items()
     }
-    return level_changes(solve(), impacts)
+    reference = solve().levels()
+    figure, axes = empty_axes(2.8)
+    axes.axhline(0, color="0.45", linewidth=0.8)
+    add_levels(axes, {name: impact.levels() - reference for name, impact in impacts.items()})
+    axes.set_ylabel(level_label("force on the floor", "Change of the level, dB"))
+    legend_above(axes)
+    return figure
 
 
+@own_style()
 def _draw_laws() -> Figure:
     laws = {
         f"Fractional, order {order:g}": FiniteElement(
@@ -140,7 +161,15 @@ def _draw_laws() -> Figure:
             viscosity="prony", prony_share=(0.5,), prony_time=(1.5e-3,)
         ),
     }
-    return loss_factor(laws)
+    figure, axes = empty_axes(2.5)
+    frequency = np.geomspace(10, 1000, 200)
+    add_curves(axes, {name: (frequency, loss_factors(m, frequency)) for name, m in laws.items()})
+    frequency_axis(axes)
+    axes.set_yscale("log")
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.set_ylabel("Loss factor")
+    legend_above(axes)
+    return figure
 
 
 def _draw_compressions() -> Figure:
@@ -154,26 +183,36 @@ def _draw_compressions() -> Figure:
     return compression(curves)
 
 
+@own_style()
 def _draw_floors() -> Figure:
     concrete = Plate(source_x=0.4, source_y=0.35)
     timber = replace(concrete, edges="absorption")
-    return floor_mobilities(
-        {
-            "180 mm of concrete": concrete,
-            "screed on a soft layer on it": replace(
-                concrete, screed_thickness=0.05, screed_loss_factor=0.02,
-                layer_stiffness=8e6, layer_loss_factor=0.15,
-            ),
-            "160 mm of cross-laminated timber": LaminateFloor(source_x=0.4, source_y=0.35),
-            "timber joists, between two": JoistFloor(
-                sheathing_modulus=3.1e9, source_x=0.4, source_y=0.35
-            ),
-            "22 mm of chipboard": replace(
-                timber, length=2.4, width=1.8, thickness=0.022, density=650, wave_speed=2200,
-                loss_factor=0.02,
-            ),
-        }
-    )  # fmt: skip
+    floors: dict[str, FloorOptions] = {
+        "180 mm of concrete": concrete,
+        "screed on a soft layer on it": replace(
+            concrete, screed_thickness=0.05, screed_loss_factor=0.02,
+            layer_stiffness=8e6, layer_loss_factor=0.15,
+        ),
+        "160 mm of cross-laminated timber": LaminateFloor(source_x=0.4, source_y=0.35),
+        "timber joists, between two": JoistFloor(
+            sheathing_modulus=3.1e9, source_x=0.4, source_y=0.35
+        ),
+        "22 mm of chipboard": replace(
+            timber, length=2.4, width=1.8, thickness=0.022, density=650, wave_speed=2200,
+            loss_factor=0.02,
+        ),
+    }  # fmt: skip
+    figure, axes = empty_axes(2.8)
+    frequency = np.geomspace(11.0, 1400.0, 1500)
+    for i, (name, floor) in enumerate(floors.items()):
+        # Resonances are as narrow as dashes: markers distinguish the curves instead.
+        style = curve_style(i, 4.5) | {"linestyle": "-", "linewidth": 0.8}
+        values = np.abs(mobility(floor, frequency).values)
+        axes.loglog(frequency, values, label=name, markevery=(30 * i, 225), **style)
+    frequency_axis(axes)
+    axes.set_ylabel("Mobility, m/(N s)")
+    legend_above(axes)
+    return figure
 
 
 def _draw_impedances() -> Figure:

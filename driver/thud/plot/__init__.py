@@ -24,8 +24,6 @@ from thud.base.display import draw_all, warn_if_not_drawn
 from thud.plot.ball_figures import (
     animate as animate,
     compression as compression,
-    draw_material as draw_material,
-    loss_factor as loss_factor,
     mode_shapes as mode_shapes,
     motion as motion,
 )
@@ -35,12 +33,10 @@ from thud.plot.floor_figures import (
     draw_floor as draw_floor,
     draw_mobility as draw_mobility,
     draw_mobility_fit as draw_mobility_fit,
-    floor_mobilities as floor_mobilities,
     plate_modes as plate_modes,
 )
 from thud.plot.impact_figures import (
     force_history as force_history,
-    level_changes as level_changes,
     levels as levels,
 )
 from thud.plot.pages import comparison_figure as comparison_figure
@@ -132,8 +128,6 @@ def case_figures(
         draws["compression"] = curve.plot
     if impact and isinstance(impact.case.floor, Plate | LaminateFloor | JoistFloor | ModalFloor):
         draws["floor_modes"] = partial(plate_modes, impact.case.floor)
-    if impact:
-        draws["loss_factor"] = partial(draw_material, impact)
     for name, drop in (("motion", impact), ("floor_motion", impact and impact.on_floor)):
         if drop and drop.motion:
             draws[name] = partial(motion, drop)

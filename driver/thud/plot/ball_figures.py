@@ -16,7 +16,7 @@ from thud.base.checks import require_kind, require_mapping, require_whole
 from thud.base.errors import InputError
 from thud.base.files import replace_file
 from thud.impact.compression import CompressionCurve
-from thud.impact.free_modes import FreeModes, loss_factors
+from thud.impact.free_modes import FreeModes
 from thud.impact.impact import Impact
 from thud.plot.style import (
     WIDTH,
@@ -24,8 +24,6 @@ from thud.plot.style import (
     add_curves,
     empty_axes,
     finish,
-    frequency_axis,
-    legend_above,
     own_or,
     own_style,
     panel_grid,
@@ -40,7 +38,6 @@ if TYPE_CHECKING:
     from matplotlib.quiver import Quiver
     from numpy.typing import NDArray
 
-    from thud.base._schema import FiniteElement
     from thud.impact.motion import Motion
 
 # Maximum number of panels that are readable at column width.
@@ -251,47 +248,6 @@ def mode_shapes(modes: FreeModes, columns: int = 3) -> Figure:
         axes.set_aspect("equal")
     add_colorbar(figure, panels, ScalarMappable(scale), "Displacement relative to its maximum")
     return figure
-
-
-@own_style()
-def loss_factor(models: Mapping[str, FiniteElement]) -> Figure:
-    """Draw the loss factor of materials against frequency.
-
-    Parameters
-    ----------
-    models
-        Finite-element models by their names in the legend.
-
-    Returns
-    -------
-    Figure
-        Frequency in Hz and loss factor, both logarithmic.
-
-    Raises
-    ------
-    InputError
-        If `models` is not a mapping of names to models, or empty.
-    """
-    require_mapping("models", models, "models")
-    figure, axes = empty_axes(2.5)
-    frequency = np.geomspace(10, 1000, 200)
-    add_curves(axes, {name: (frequency, loss_factors(m, frequency)) for name, m in models.items()})
-    frequency_axis(axes)
-    axes.set_yscale("log")
-    axes.yaxis.set_major_formatter("{x:g}")
-    axes.set_ylabel("Loss factor")
-    legend_above(axes)
-    return figure
-
-
-@own_style()
-def draw_material(impact: Impact) -> Figure | None:
-    """Draw the loss factor of a model that has a viscous material."""
-    viscosity = impact.case.to_namelist().get("material", {}).get("viscosity", "none")
-    if viscosity == "none":
-        return None
-    model: Any = impact.case.model
-    return loss_factor({str(viscosity).replace("_", " "): model})
 
 
 @own_style()

@@ -9,9 +9,8 @@ import numpy as np
 from matplotlib.colors import to_rgba
 from matplotlib.patches import Rectangle
 
-from thud.base._schema import FloorOptions
 from thud.base.bridge import ask
-from thud.base.checks import refuse, require_kind, require_mapping, require_whole
+from thud.base.checks import refuse, require_whole
 from thud.case.case import Case, case_text
 from thud.floors.mobility import mobility
 from thud.level.levels import BANDWIDTHS, get_bands, low_pass
@@ -40,6 +39,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from thud.base._schema import FloorOptions
     from thud.case.constructions import Layer
     from thud.floors.impedance import BallImpedance
     from thud.floors.mobility import Mobility
@@ -224,27 +224,6 @@ def plate_modes(floor: FloorOptions, count: int = 6, columns: int = 3) -> Figure
         axes.set_aspect("equal")
         axes.set_title(f"{natural:.1f} Hz")
     add_colorbar(figure, panels, drawn, "Displacement relative to its maximum")
-    return figure
-
-
-@own_style()
-def floor_mobilities(floors: Mapping[str, FloorOptions]) -> Figure:
-    """Draw the magnitudes of the mobilities of floors, by name, against frequency."""
-    require_mapping("floors", floors, "floors")
-    for name, floor in floors.items():
-        require_kind(name, floor, FloorOptions)
-    figure, axes = empty_axes(2.8)
-    frequency = np.geomspace(11.0, 1400.0, 1500)
-    for i, (name, floor) in enumerate(floors.items()):
-        # Resonances are as narrow as dashes: markers distinguish the curves instead.
-        style = curve_style(i, 4.5) | {"linestyle": "-", "linewidth": 0.8}
-        axes.loglog(
-            frequency, np.abs(mobility(floor, frequency).values), label=escape_label(name),
-            markevery=(30 * i, 225), **style,
-        )  # fmt: skip
-    frequency_axis(axes)
-    axes.set_ylabel("Mobility, m/(N s)")
-    legend_above(axes)
     return figure
 
 

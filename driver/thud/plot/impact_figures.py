@@ -176,25 +176,6 @@ def draw_blocked_force(force: BlockedForce, ax: Axes | None = None) -> Figure:
 
 
 @own_style()
-def level_changes(reference: Impact, impacts: Mapping[str, Impact]) -> Figure:
-    """Draw the change of octave levels of the assessed force relative to a reference, dB.
-
-    Impacts are stated by their names in the legend.
-    """
-    figure, axes = empty_axes(2.8)
-    axes.axhline(0, color="0.45", linewidth=0.8)
-    curves, name = assessed_curves(impacts, None)
-    changes = {
-        label: impact.levels(force=kind) - reference.levels(force=kind)
-        for label, (impact, kind) in curves.items()
-    }
-    add_levels(axes, changes)
-    axes.set_ylabel(level_label(name, "Change of the level, dB"))
-    legend_above(axes)
-    return figure
-
-
-@own_style()
 def overview(impact: Impact) -> Figure:
     """Draw the assessed force and its octave levels."""
     name = impact.case.model.name.replace("_", " ") if impact.case.model else ""
