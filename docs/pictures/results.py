@@ -59,7 +59,7 @@ def floating_floor() -> Figure:
 def floors() -> Figure:
     """Draw three slabs."""
     paths = [INPUTS / f"floors/concrete_{thickness}.nml" for thickness in (140, 180, 220)]
-    return thud.compare_floors({path.stem: thud.read_case(path) for path in paths}).figure()
+    return thud.compare_floors({path.stem: thud.read_case(path) for path in paths}).plot()
 
 
 def comparison() -> Figure:

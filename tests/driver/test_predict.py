@@ -154,7 +154,7 @@ def test_page_states_ratings_contributions_and_sources(floor: PredictedFloor, pa
         assert source in text
     for words in ("5 × 4 × 2 m, 40 m³", "T = 0.5 s", "stated in the case", "15 MN/m³"):  # noqa: RUF001
         assert words in text
-    for note in floor.prediction.warnings:
+    for note in map(str, floor.prediction.notes):
         assert str(note) in text
     for row in band_rows(floor):
         assert all(cell in text for cell in row)
@@ -474,7 +474,7 @@ def test_workbook_has_fitted_columns_assumptions_and_warnings() -> None:
     rows = list(book["assumptions"].iter_rows(min_row=2, values_only=True))
     assert rows == [(floor.name, *row) for row in floor.assumptions[1:]]
     texts = [row[1] for row in book["warnings"].iter_rows(min_row=2, values_only=True)]
-    assert texts == list(map(str, floor.prediction.warnings))
+    assert texts == list(map(str, floor.prediction.notes))
     for sheet in book:
         assert sheet.freeze_panes == "B2"
         titles = [cell for cell in sheet[1] if len(cell.value) < 55]

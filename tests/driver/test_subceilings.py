@@ -205,7 +205,7 @@ def test_air_of_the_room_is_the_spring_of_a_subceiling() -> None:
     assert abs(frequencies_of(floor, 150.0, light) / resonance - 1).min() > 0.01
     fast = replace(dense, sound_speed=400.0)
     deep = thud.solve(model="hollow_sphere", floor=replace(HUNG, cavity_depth=0.5), room=fast)
-    assert any("above 200 Hz the cavity" in warning for warning in deep.warnings)
+    assert any("above 200 Hz the cavity" in str(note) for note in deep.notes)
 
 
 def test_air_of_the_room_damps_the_floor_and_changes_the_force() -> None:

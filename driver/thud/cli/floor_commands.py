@@ -118,7 +118,7 @@ def compare_floor_cases(options: argparse.Namespace) -> int:
     results.require(["floors.svg", "floors.html"])
     comparison = floors.compare(options)
     shown = format_rows(comparison.rows())
-    return finish(options, results, comparison.files(), shown, comparison.warnings)
+    return finish(options, results, comparison.files(), shown, comparison.notes)
 
 
 FLOOR = Command(
@@ -162,7 +162,7 @@ def predict(options: argparse.Namespace) -> int:
     ]
     written = contents(predicted, results.folder, report=options.report)
     shown = "\n\n".join(map(screen_text, predicted))
-    return finish(options, results, written, shown, comparison.warnings)
+    return finish(options, results, written, shown, comparison.notes)
 
 
 PREDICT = Command(
@@ -193,7 +193,7 @@ def listen_to_cases(options: argparse.Namespace) -> int:
         refuse(f"{path} is an input, which is never replaced", "another file")
     chosen = {name: getattr(options, name) for name in ("position", "pause", "seed")}
     sound = listen(floors.compare(options).predictions, **chosen)
-    print_notes(note.message for note in sound.notes)
+    print_notes(sound.notes)
     path.parent.mkdir(parents=True, exist_ok=True)
     sound.save(path)
     if not options.quiet:

@@ -148,7 +148,7 @@ def run_calibrate(options: argparse.Namespace) -> int:
         print(plate.lines())
         if not options.quiet:
             print_results(f"# {plate}")
-        print_notes(note.message for note in plate.notes)
+        print_notes(plate.notes)
         return 0
     chosen = {name: getattr(options, name) for name in (*OF_A_FORCE, "channel")}
     chosen["uncertainty"] = options.uncertainty or 0.0

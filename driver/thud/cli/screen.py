@@ -34,10 +34,10 @@ def print_path(title: str, path: object) -> None:
     tqdm.write(line if len(line) <= WIDTH else f"{title}:\n{path}", file=sys.stdout)
 
 
-def print_notes(warnings: Iterable[object]) -> None:
-    """Print warnings above any progress bar."""
-    for warning in warnings:
-        _print_message(str(warning), YELLOW)
+def print_notes(notes: Iterable[object]) -> None:
+    """Print notes, with their subjects, or texts above any progress bar."""
+    for note in notes:
+        _print_message(str(getattr(note, "message", note)), YELLOW)
 
 
 def print_error(message: str) -> None:

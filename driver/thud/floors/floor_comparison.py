@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from tqdm import tqdm
 
-from thud.base._schema import RATED_BANDS
+from thud.base._schema import RATED_BANDS, RATINGS
 from thud.base.checks import refuse, require_kind, require_mapping
-from thud.base.display import Displayed
+from thud.base.display import Tabulated
 from thud.base.errors import ThudError
-from thud.base.files import Page
+from thud.base.files import Results
 from thud.base.tables import Result
 from thud.case.case import Case
 from thud.case.constructions import Construction, with_floor
@@ -24,18 +26,20 @@ from thud.floors.prediction import (
 )
 from thud.floors.tapping import has_tapping_level, tapping_level
 from thud.impact.compute import compute
+from thud.level.rating import class_text
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    import os
+    from collections.abc import Iterable, Mapping
 
     from matplotlib.figure import Figure
 
-# Rows of the table that may be empty.
-_OPTIONAL = ("source", "class (KS F 2863-2)", "required, dB")
+    from thud.base.display import Columns
+    from thud.base.note import Note
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FloorComparison(Displayed, Page):
+class FloorComparison(Tabulated):
     """Predictions for several floors and rooms, in columns of a table.
 
     Attributes
@@ -45,43 +49,82 @@ class FloorComparison(Displayed, Page):
     """
 
     predictions: dict[str, RoomPrediction]
-    _command = "floor"
 
     @property
-    def warnings(self) -> list[str]:
-        """Warnings of the predictions, each once, with the names of its floors."""
-        floors: dict[str, list[str]] = {}
+    def notes(self) -> tuple[Note, ...]:
+        """Warnings of the predictions, each once; their subjects are the names of its floors."""
+        floors: dict[Note, list[str]] = {}
         for name, prediction in self.predictions.items():
-            for warning in prediction.warnings:
-                floors.setdefault(warning, []).append(name)
-        return [f"{', '.join(names)}: {warning}" for warning, names in floors.items()]
+            for note in prediction.notes:
+                floors.setdefault(note, []).append(name)
+        return tuple(replace(note, subject=", ".join(names)) for note, names in floors.items())
+
+    def columns(self) -> Columns:
+        """Return the ratings and what they follow from; a row for each floor."""
+        predictions = [*self.predictions.values()]
+        # The standards of the ratings are for the ball.
+        titled = min(predictions, key=lambda prediction: prediction.is_ball)
+        ratings: dict[str, tuple[Iterable[Any], str]] = {}
+        for key in RATINGS:
+            rated = [prediction.ratings[key] for prediction in predictions]
+            ratings |= {
+                f"{rating_title(titled, key)}, dB": ([rating.rounded for rating in rated], "d"),
+                f"standard uncertainty of {key}, dB": ([r.uncertainty for r in rated], ".1f"),
+            }
+        octaves = np.transpose([prediction.octave_level for prediction in predictions])
+        tapping = [_tapping(prediction) for prediction in predictions]
+        required = [prediction.requirement for prediction in predictions]
+        return {
+            "name": ([*self.predictions], ""),
+            "floor": ([p.floor.name.replace("_", " ") for p in predictions], ""),
+            "force": ([p.force for p in predictions], ""),
+            "source": ([_source(p) for p in predictions], ""),
+            **ratings,
+            "class (KS F 2863-2)": ([class_text(p.korean_class) for p in predictions], ""),
+            "required, dB": ([r.limit if r else np.nan for r in required], "g"),
+            "required rating": ([r.rating.name if r else "" for r in required], ""),
+            "verdict": ([Result(r.verdict, r.verdict) if r else "" for r in required], ""),
+            "probability, %": ([100 * r.probability if r else np.nan for r in required], ".0f"),
+            **{
+                f"{frequency:g} Hz octave, dB": (levels, ".1f")
+                for frequency, levels in zip(RATED_BANDS["octave"], octaves, strict=True)
+            },
+            "energy into the floor from 50 to 630 Hz, mJ": (
+                [1e3 * p.energy.sum() for p in predictions],
+                ".3g",
+            ),
+            "tapping machine L_n,w, dB": ([level for level, _ in tapping], ".0f"),
+            "tapping machine C_I, dB": ([adaptation for _, adaptation in tapping], ".0f"),
+        }
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text, with a column for each floor."""
-        # The standards of the ratings are for the ball.
-        titled = min(self.predictions.values(), key=lambda prediction: prediction.is_ball)
-        columns = [_column(*item, titled) for item in self.predictions.items()]
-        rows = [(title, *(column[title] for column in columns)) for title in columns[0]]
-        # Rows that say something of a floor.
-        return [row for row in rows if row[0] not in _OPTIONAL or any(row[1:])]
+        """Return header and rows of text, with a column for each floor, without empty rows."""
+        rows = []
+        for title, (values, form) in self.columns().items():
+            cells = [value if isinstance(value, str) else f"{value:{form}}" for value in values]
+            rows.append((title, *("" if cell == "nan" else cell for cell in cells)))
+        return [row for row in rows if any(row[1:])]
 
-    def figure(self) -> Figure:
-        """Return ratings, levels and what they follow from as a matplotlib figure."""
+    def plot(self) -> Figure:
+        """Draw ratings, levels and what they follow from."""
         from thud.plot.pages import draw_floors
 
         return draw_floors(self)
 
-    def html(self) -> str:
-        """Return a page with interactive plots and the table as self-contained HTML."""
-        from thud.plot.pages import floors_html
+    def save(self, path: str | os.PathLike[str], *, replace: bool = False) -> None:
+        """Write `files` into a directory of their own, which is replaced as a whole.
 
-        return floors_html(self)
+        Results of something else are replaced only if `replace` is true. Raise InputError if the
+        directory holds any other file, and OSError if a file cannot be written.
+        """
+        Results(Path(path), "floor", replace=replace).write(self.files())
 
     def files(self) -> dict[str, bytes]:
         """Return ``floors.svg`` and ``floors.html`` by name."""
+        from thud.plot.pages import floors_html
         from thud.plot.save_figures import page_files
 
-        return page_files("floors", self.figure, self.html())
+        return page_files("floors", self.plot, floors_html(self))
 
     def __repr__(self) -> str:
         """Return the names of the floors and their levels."""
@@ -128,39 +171,16 @@ def compare_floors(
     return FloorComparison(result)
 
 
-def _column(name: str, prediction: RoomPrediction, titled: RoomPrediction) -> dict[str, str]:
-    """Return the column of a floor by the titles of rows, those of ratings as of `titled`."""
-    korean, required = prediction.korean_class, prediction.requirement
-    source = "" if prediction.is_ball else str(prediction.source.limits_source)
-    floor, tapping = prediction.floor, "–"
-    if has_tapping_level(floor, prediction.room):
-        level = tapping_level(floor, prediction.room)
-        tapping = f"{level.weighted} ({level.adaptation})"
-    return {
-        "": name,
-        "floor": floor.name.replace("_", " "),
-        "force": prediction.force,
-        "source": ", ".join(filter(None, (source, source_note(prediction)))),
-        **{
-            f"{rating_title(titled, key)}, dB (standard uncertainty)": (
-                f"{rating.rounded} ({rating.uncertainty:.1f})"
-            )
-            for key, rating in prediction.ratings.items()
-        },
-        "class (KS F 2863-2)": (
-            "" if korean is None else f"class {korean}" if korean else "no class"
-        ),
-        "required, dB": Result(
-            f"{required.limit:g} ({required.rating.name}): {required.verdict}, "
-            f"{100 * required.probability:.0f} %",
-            required.verdict,
-        )
-        if required
-        else "",
-        **{
-            f"{frequency:g} Hz octave, dB": f"{level:.1f}"
-            for frequency, level in zip(RATED_BANDS["octave"], prediction.octave_level, strict=True)
-        },
-        "energy into the bearing floor, 50 to 630 Hz, mJ": f"{1e3 * prediction.energy.sum():.3g}",
-        "tapping machine, L_n,w (C_I), dB": tapping,
-    }
+def _tapping(prediction: RoomPrediction) -> tuple[float, float]:
+    """Return weighted level and adaptation term of the tapping machine, dB; NaN if none apply."""
+    floor, room = prediction.floor, prediction.room
+    if not has_tapping_level(floor, room):
+        return np.nan, np.nan
+    level = tapping_level(floor, room)
+    return level.weighted, level.adaptation
+
+
+def _source(prediction: RoomPrediction) -> str:
+    """Return a source other than the ball, and that it does not conform."""
+    name = "" if prediction.is_ball else str(prediction.source.limits_source)
+    return ", ".join(filter(None, (name, source_note(prediction))))

@@ -20,6 +20,7 @@ from thud.level.levels import force_exposure_levels, get_bands
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
@@ -108,17 +109,13 @@ class BallImpedance(Tabulated):
             "1 dB below, N s/m": (self.limit(), ".0f"),
         }
 
-    def plot(self, floors: Mapping[str, FloorOptions] | None = None) -> Figure:
-        """Draw the impedances of source and floors, and the change of levels by the floors.
-
-        Parameters
-        ----------
-        floors
-            Floors by name in the legend.
-        """
+    def plot(
+        self, floors: Mapping[str, FloorOptions] | None = None, ax: Axes | None = None
+    ) -> Figure:
+        """Draw the impedances of source and floors, by name, and where levels change by 1 dB."""
         from thud.plot.floor_figures import ball_impedances
 
-        return ball_impedances({"": self}, floors or {})
+        return ball_impedances({"": self}, floors or {}, ax)
 
 
 def ball_impedance(

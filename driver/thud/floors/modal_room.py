@@ -20,6 +20,7 @@ from thud.case.case import case_text
 from thud.floors.prediction import RoomPrediction, predict_level
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
@@ -91,11 +92,11 @@ class ModalRoom(Tabulated):
             "maximum, dB": (self.level.max(axis=(0, 1)), ".1f"),
         }
 
-    def plot(self) -> Figure:
+    def plot(self, ax: Axes | None = None) -> Figure:
         """Draw the levels of all positions."""
         from thud.plot.room_figures import draw_modal_room
 
-        return draw_modal_room(self)
+        return draw_modal_room(self, ax)
 
     def __repr__(self) -> str:
         """Return the size of the room and the numbers of positions and modes."""

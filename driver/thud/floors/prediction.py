@@ -31,6 +31,7 @@ from thud.level.rating import (
 )
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
@@ -144,11 +145,6 @@ class RoomPrediction(RoomLevel, Tabulated):
             )
         return (*result, *self.source_notes)
 
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Sentences of `notes`."""
-        return tuple(map(str, self.notes))
-
     def difference(self, measured: RoomLevels) -> Array:
         """Return measured − predicted level, dB, shape (12,), without standardization.
 
@@ -172,11 +168,11 @@ class RoomPrediction(RoomLevel, Tabulated):
             "energy, mJ": (1e3 * self.energy, ".3g"),
         }
 
-    def plot(self, measured: RoomLevels | None = None) -> Figure:
-        """Draw force, energy, floor and levels in the room, with measured levels if stated."""
-        from thud.plot.room_figures import draw_prediction
+    def plot(self, measured: RoomLevels | None = None, ax: Axes | None = None) -> Figure:
+        """Draw levels, also measured ones, and what they follow from; in axes the levels alone."""
+        from thud.plot.room_figures import draw_levels, draw_prediction
 
-        return draw_prediction(self, measured)
+        return draw_levels(self, measured, ax) if ax else draw_prediction(self, measured)
 
     def __repr__(self) -> str:
         """Return rating, requirement and what is wrong with the source."""

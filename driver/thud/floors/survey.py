@@ -26,6 +26,7 @@ from thud.recordings.table import read_table
 if TYPE_CHECKING:
     import os
 
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
@@ -196,11 +197,11 @@ class RoomLevels(Tabulated):
             title: (values, form) for title, (values, form) in columns.items() if values is not None
         }
 
-    def plot(self) -> Figure:
+    def plot(self, ax: Axes | None = None) -> Figure:
         """Draw the levels of positions, their mean, the standardized levels and the background."""
         from thud.plot.room_figures import room_levels
 
-        return room_levels(self)
+        return room_levels(self, ax)
 
     def __repr__(self) -> str:
         """Return the single-number ratings."""

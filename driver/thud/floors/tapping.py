@@ -15,6 +15,8 @@ from thud.case.case import Case, case_text
 from thud.case.constructions import Construction, with_floor
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.base._schema import FloorOptions
@@ -77,6 +79,12 @@ class TappingLevel(Tabulated):
     def columns(self) -> Columns:
         """Return the levels."""
         return {"band, Hz": (self.frequency, "g"), "L_n, dB": (self.level, ".1f")}
+
+    def plot(self, ax: Axes | None = None) -> Figure:
+        """Draw the levels and the shifted reference curve."""
+        from thud.plot.room_figures import draw_tapping
+
+        return draw_tapping(self, ax)
 
     def __repr__(self) -> str:
         """Return weighted level and adaptation term."""

@@ -19,6 +19,7 @@ from thud.impact.motion import write_vtu
 if TYPE_CHECKING:
     import os
 
+    from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
     from thud.base.bridge import Bundle
@@ -81,6 +82,12 @@ class FreeModes(Tabulated):
         """
         names = (f"mode {i}, {f:.3f} Hz" for i, f in enumerate(self.frequency, 1))
         write_vtu(path, self.start, dict(zip(names, self.shape, strict=True)))
+
+    def plot(self) -> Figure:
+        """Draw the mode shapes."""
+        from thud.plot.ball_figures import mode_shapes
+
+        return mode_shapes(self)
 
     def columns(self) -> Columns:
         """Return frequencies, harmonics and participations."""

@@ -22,7 +22,6 @@ from thud.plot.style import (
     add_curves,
     band_axis,
     curve_style,
-    empty_axes,
     escape_label,
     finish,
     frequency_axis,
@@ -256,13 +255,15 @@ _FREQUENCIES = np.geomspace(22.0, 720.0, 1000)
 
 @own_style()
 def ball_impedances(
-    sources: Mapping[str, BallImpedance], floors: Mapping[str, FloorOptions]
+    sources: Mapping[str, BallImpedance],
+    floors: Mapping[str, FloorOptions],
+    ax: Axes | None = None,
 ) -> Figure:
     """Draw the impedances of sources as filled markers, and of floors as lines.
 
     Floors below the open markers change the level of the force by more than 1 dB.
     """
-    figure, axes = empty_axes(2.8)
+    axes = own_or(ax, 2.8)
     impedances = {
         name: (_FREQUENCIES, 1 / np.abs(mobility(floor, _FREQUENCIES).values))
         for name, floor in floors.items()
@@ -278,5 +279,4 @@ def ball_impedances(
     axes.set_yscale("log")
     frequency_axis(axes)
     axes.set_ylabel("Impedance, N s/m")
-    legend_above(axes)
-    return figure
+    return finish(axes, ax)

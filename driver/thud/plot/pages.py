@@ -219,7 +219,8 @@ def floors_html(comparison: FloorComparison) -> str:
     text = "Levels in the room below, and the chain that leads to them: force, energy, floor, room."
     # The first plot has the full width: the level in the room.
     plots = [plots[-1], *plots[:-1]]
-    return html_page("Comparison of floors", text, comparison.rows(), plots, comparison.warnings)
+    warnings = [note.message for note in comparison.notes]
+    return html_page("Comparison of floors", text, comparison.rows(), plots, warnings)
 
 
 def _step_values(prediction: RoomPrediction) -> tuple[NDArray[np.float64], ...]:

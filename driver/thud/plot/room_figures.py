@@ -14,7 +14,6 @@ from thud.plot.style import (
     add_levels,
     band_axis,
     curve_style,
-    empty_axes,
     escape_label,
     finish,
     legend_above,
@@ -31,14 +30,15 @@ if TYPE_CHECKING:
     from thud.floors.modal_room import ModalRoom
     from thud.floors.prediction import RoomPrediction
     from thud.floors.survey import RoomLevels
+    from thud.floors.tapping import TappingLevel
 
 RATING = f"Bands and their A-weighted sum {RATING_SYMBOL}"
 
 
 @own_style()
-def room_levels(room: RoomLevels) -> Figure:
+def room_levels(room: RoomLevels, ax: Axes | None = None) -> Figure:
     """Draw levels in a room against their bands."""
-    figure, axes = empty_axes(2.4)
+    axes = own_or(ax, 2.4)
     x = np.arange(len(room.frequency))
     for i, levels in enumerate(room.positions if len(room.positions) > 1 else []):
         label = None if i else "positions"
@@ -50,8 +50,7 @@ def room_levels(room: RoomLevels) -> Figure:
     if room.background is not None:
         axes.plot(x, room.background, "k:", linewidth=0.9, label="background")
     axes.set_ylabel(FAST_LEVEL)
-    legend_above(axes, title=RATING)
-    return figure
+    return finish(axes, ax, RATING)
 
 
 @own_style()
@@ -60,12 +59,7 @@ def draw_prediction(prediction: RoomPrediction, measured: RoomLevels | None = No
     figure = new_figure(4.6)
     below, energy, radiation, loss = figure.subplots(4, 1, sharex=True, height_ratios=(2, 1, 1, 1))
     x = np.arange(len(prediction.frequency))
-    _draw_below(below, prediction)
-    if measured is not None:
-        level = prediction.level + prediction.difference(measured)
-        label = f"measured: {measured.rating.rounded} dB"
-        below.plot(x, level, color="black", marker="x", linewidth=1, linestyle=":", label=label)
-    below.set_ylabel(FAST_LEVEL)
+    _draw_below(below, prediction, measured)
     style = {"color": "black", "linewidth": 1, "marker": ".", "markersize": 4}
     energy.semilogy(x, 1e3 * prediction.energy, **style)
     energy.set_ylabel("Energy into\nfloor, mJ")
@@ -81,8 +75,8 @@ def draw_prediction(prediction: RoomPrediction, measured: RoomLevels | None = No
     return figure
 
 
-def _draw_below(axes: Axes, prediction: RoomPrediction) -> None:
-    """Draw the levels with their standard uncertainty, and those with other edges."""
+def _draw_below(axes: Axes, prediction: RoomPrediction, measured: RoomLevels | None) -> None:
+    """Draw levels with their standard uncertainty, with other edges, and measured ones."""
     level, uncertainty = prediction.level, prediction.uncertainty
     x = np.arange(len(level))
     axes.fill_between(
@@ -96,23 +90,27 @@ def _draw_below(axes: Axes, prediction: RoomPrediction) -> None:
         for label, (edge, line) in edges.items():
             axes.plot(x[modal], edge[modal], line, color=COLORS[1], linewidth=1, label=label)
     axes.plot(x, level, label=f"{prediction.rating}", **curve_style(0, 3.5))
-
-
-@own_style()
-def draw_levels(prediction: RoomPrediction) -> Figure:
-    """Draw the levels in the room below with their standard uncertainty."""
-    figure, axes = empty_axes(2.5)
-    _draw_below(axes, prediction)
-    band_axis(axes, "third", prediction.frequency)
+    if measured is not None:
+        label = f"measured: {measured.rating.rounded} dB"
+        axes.plot(x, level + prediction.difference(measured), "kx:", linewidth=1, label=label)
     axes.set_ylabel(FAST_LEVEL)
-    legend_above(axes, title=RATING)
-    return figure
 
 
 @own_style()
-def draw_modal_room(room: ModalRoom) -> Figure:
+def draw_levels(
+    prediction: RoomPrediction, measured: RoomLevels | None = None, ax: Axes | None = None
+) -> Figure:
+    """Draw the levels in the room below with their standard uncertainty."""
+    axes = own_or(ax, 2.5)
+    _draw_below(axes, prediction, measured)
+    band_axis(axes, "third", prediction.frequency)
+    return finish(axes, ax, RATING)
+
+
+@own_style()
+def draw_modal_room(room: ModalRoom, ax: Axes | None = None) -> Figure:
     """Draw the levels of all pairs of positions and their energy mean."""
-    figure, axes = empty_axes(2.6)
+    axes = own_or(ax, 2.6)
     x = np.arange(len(room.frequency))
     levels = room.level.reshape(-1, len(x))
     low, first, third, high = np.percentile(levels, (5, 25, 75, 95), axis=0)
@@ -124,8 +122,21 @@ def draw_modal_room(room: ModalRoom) -> Figure:
     axes.plot(x, room.mean, zorder=3, label="mean of positions", **curve_style(0, 3.5))
     band_axis(axes, "third", room.frequency)
     axes.set_ylabel(FAST_LEVEL)
-    legend_above(axes)
-    return figure
+    return finish(axes, ax)
+
+
+@own_style()
+def draw_tapping(tapping: TappingLevel, ax: Axes | None = None) -> Figure:
+    """Draw the levels of the tapping machine, and the shifted reference curve."""
+    from thud.floors.tapping import AT_500, CURVE, RATED
+
+    axes = own_or(ax, 2.4)
+    add_levels(axes, {"level": tapping.level}, "third", tapping.frequency, 3.5)
+    shifted = CURVE + tapping.weighted - AT_500
+    label = f"reference curve, $L_\\mathrm{{n,w}}$ {tapping.weighted} dB"
+    axes.plot(np.arange(len(tapping.frequency))[RATED], shifted, "k:", label=label)
+    axes.set_ylabel("Normalized level,\ndB re 20 µPa")
+    return finish(axes, ax)
 
 
 @own_style()

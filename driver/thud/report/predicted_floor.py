@@ -347,7 +347,7 @@ def _tables(
         "modes": (("mode", "natural frequency, Hz"), floor.modes),
         **({"changes": (("change", "difference, dB"), changed)} if changes else {}),
         "assumptions": (("quantity", "value", "source"), floor.assumptions[1:]),
-        "warnings": (("warning",), [(warning,) for warning in prediction.warnings]),
+        "warnings": (("warning",), [(str(note),) for note in prediction.notes]),
     }
 
 
