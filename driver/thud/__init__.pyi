@@ -21,10 +21,7 @@ from .comparison.comparison import (
     Comparison as Comparison,
     compare as compare,
 )
-from .export.floor_sound import (
-    FloorSound as FloorSound,
-    SoundLevels as SoundLevels,
-)
+from .export.floor_sound import FloorSound as FloorSound
 from .export.force_files import (
     BlockedForce as BlockedForce,
     blocked_force as blocked_force,

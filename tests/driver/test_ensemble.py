@@ -99,12 +99,9 @@ def test_equals_the_single_solver() -> None:
         for name in ("contact_time", "peak_force", "peak_elastic_force", "max_deflection",
                      "restitution", "impulse"):  # fmt: skip
             assert getattr(ensemble, name)[i] == pytest.approx(getattr(impact, name), rel=1e-10)
-        for force in ("elastic", "floor"):
-            met = getattr(ensemble, f"{force}_conforms")[i]
-            assert met == bool(impact.assess(force=force))  # type: ignore[arg-type]
         assert ensemble.conforms[i] == bool(impact.assess())
     # Small, heavy balls; some of them conform by the force on the floor.
-    assert 5 < np.count_nonzero(ensemble.floor_conforms) < 35
+    assert 5 < np.count_nonzero(ensemble.conforms) < 35
 
 
 def test_fails_where_the_single_solver_fails() -> None:

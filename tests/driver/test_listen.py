@@ -160,7 +160,6 @@ def test_floors_follow_each_other_at_one_scale(
     assert found.rows()[1][:2] == ("0.00", "concrete")
     assert all(name in repr(found) for name in FLOORS)
     assert "concrete" in repr(first)
-    assert f"{first.level.a_weighted:.1f} dB" in repr(first.level)
     assert [f.pressure.tolist() for f in thud.listen(predictions).sounds] == [
         first.pressure.tolist(), second.pressure.tolist()
     ]  # fmt: skip
@@ -246,7 +245,7 @@ def test_stated_level_is_that_of_its_own_file(oracle: Callable[..., None]) -> No
 
 def test_bands_that_cannot_be_reached_are_said(found: thud.RoomSound) -> None:
     sound = found.sounds[0]
-    louder = replace(sound.reference, a_weighted=sound.level.a_weighted + 0.7)
+    louder = sound.reference._replace(a_weighted=sound.level.a_weighted + 0.7)
     loud = replace(found, sounds=(replace(sound, reference=louder),))
     assert (loud.notes[-1].code, loud.notes[-1].subject) == ("sound_deviates", "concrete")
     assert loud.notes[-1].value == pytest.approx(0.7, abs=0.26)

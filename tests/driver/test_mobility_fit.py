@@ -68,7 +68,7 @@ def test_modes_and_their_number_are_found(exact: thud.MobilityFit) -> None:
     assert exact.floor.direct == pytest.approx(2e-6, rel=1e-6)
     assert exact.error < 1e-10
     assert not exact.notes
-    assert max(abs(level) for _, level in exact.band_errors().values()) < 1e-9
+    assert abs(exact.to_dataframe()["real_part_dB"]).max() < 1e-9
     np.testing.assert_allclose(exact.fitted.values, MOBILITY, rtol=1e-8)
 
 
@@ -273,7 +273,8 @@ def test_negative_lines_raise_a_warning_and_left_out() -> None:
 
 def test_namelist_is_the_floor(tmp_path: Path, exact: thud.MobilityFit) -> None:
     path = tmp_path / "case.nml"
-    path.write_text("&ball /\n&drop /\n&model /\n" + exact.namelist())
+    exact.save(path)
+    path.write_text("&ball /\n&drop /\n&model /\n" + path.read_text())
     assert thud.read_case(path).floor == exact.floor
 
 
@@ -401,12 +402,12 @@ def test_errors_are_relative_to_the_measurement(exact: thud.MobilityFit) -> None
     found = scaled_fit(exact, factor)
     errors = abs(1 / factor - 1)
     assert found.error == pytest.approx(np.sqrt((errors**2).mean()))
-    bands = found.band_errors()
+    bands = found.to_dataframe().set_index("octave_Hz")
     # The measurement reaches from 10 to 1000 Hz: all octaves.
-    assert list(bands) == [31.5, 63, 125, 250, 500]
-    for band in (31.5, 63, 125):
-        assert bands[band] == pytest.approx((0.2, 10 * np.log10(0.8)))
-    assert bands[500][0] == pytest.approx(errors[-1])
+    assert list(bands.index) == [31.5, 63, 125, 250, 500]
+    assert bands["error_%"].iloc[:3].tolist() == pytest.approx([20.0] * 3)
+    assert bands["real_part_dB"].iloc[:3].tolist() == pytest.approx([10 * np.log10(0.8)] * 3)
+    assert bands["error_%"].iloc[-1] == pytest.approx(100 * errors[-1])
 
 
 def test_octaves_that_are_not_covered_have_no_error(exact: thud.MobilityFit) -> None:
@@ -418,7 +419,7 @@ def test_octaves_that_are_not_covered_have_no_error(exact: thud.MobilityFit) -> 
         (np.append(False, inside[:-1]), [125, 250]),
     ):
         found = replace(exact, measured=thud.Mobility(FREQUENCY[keep], MOBILITY[keep]))
-        assert list(found.band_errors()) == expected
+        assert found.to_dataframe()["octave_Hz"].tolist() == expected
 
 
 @pytest.mark.parametrize(

@@ -98,7 +98,6 @@ several: thud.FloorComparison = thud.compare_floors({"thin": below, deck.name: b
 sound: thud.RoomSound = thud.listen({"thin": below, "same": below}, pause=0.5)
 sound.save(folder / "sound.wav")
 heard: tuple[thud.FloorSound, ...] = sound.sounds
-heard_levels: thud.SoundLevels = heard[0].level
 (folder / "levels.csv").write_text("frequency,P1\n63,65\n125,64\n250,58\n500,56\n")
 site: thud.RoomLevels = thud.read_room_levels(folder / "levels.csv", volume=40.0)
 rating: thud.Rating = thud.rating(thud.standardized_level(site.level, 0.6, 40.0))

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from functools import lru_cache
 from operator import itemgetter
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.signal import butter, lfilter, resample, sosfilt
@@ -15,12 +15,10 @@ from scipy.special import exprel
 from thud.base._schema import RATED_BANDS
 from thud.base.checks import refuse_value, require_whole
 from thud.base.display import Tabulated
-from thud.base.immutable import Immutable
 from thud.base.note import Note
 from thud.floors.modal_room import positions_below
 from thud.floors.prediction import BANDS, RoomPrediction
 from thud.level.levels import get_bands
-from thud.level.rating import MAX_LEVEL, rating
 from thud.recordings.filters import band_filters
 
 if TYPE_CHECKING:
@@ -64,18 +62,11 @@ MIN_CHANGE = 0.01
 MAX_DEVIATION = 0.5
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class SoundLevels(Immutable):
-    """Maximum Fast levels of a sound, dB re 20 uPa.
+class SoundLevels(NamedTuple):
+    """Maximum Fast levels, dB re 20 uPa: of the bands 50 to 630 Hz, of the octaves, and L_AFmax.
 
-    Attributes
-    ----------
-    third : ndarray, shape (12,)
-        Levels of the one-third-octave bands 50 to 630 Hz.
-    octave : ndarray, shape (4,)
-        Levels of the octaves 63 to 500 Hz; each is the maximum of the sum of its bands.
-    a_weighted : float
-        A-weighted level L_AFmax; as a reference, that of the modal sound and of bands of noise.
+    The level of an octave is the maximum of the sum of its bands. The A-weighted level of a
+    reference is that of the modal sound and of bands of noise.
     """
 
     third: Array
@@ -90,10 +81,6 @@ class SoundLevels(Immutable):
     def deviation(self, reference: SoundLevels) -> float:
         """Return the largest difference of octaves and A-weighted levels, dB."""
         return float(abs(self.shown - reference.shown).max())
-
-    def __repr__(self) -> str:
-        """Return the A-weighted level."""
-        return f"<SoundLevels: L_AFmax {self.a_weighted:.1f} dB>"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -141,20 +128,6 @@ class FloorSound(Tabulated):
     def place(self) -> str:
         """Numbers of the positions of ball and microphone; a dash without modal bands."""
         return "-" if self.position is None else "{}, {}".format(*self.position)
-
-    @property
-    def description(self) -> str:
-        """Bands of the modal sound and of the noise."""
-        bands, n_modal = RATED_BANDS[BANDS], self.prediction.n_modal
-        parts = []
-        if self.position is not None:
-            parts.append(
-                f"modes of floor and room from {bands[0]:g} to {bands[n_modal - 1]:g} Hz at "
-                f"the positions of ball and microphone {self.place}"
-            )
-        if n_modal < len(bands):
-            parts.append(f"noise from {bands[n_modal]:g} to {bands[-1]:g} Hz")
-        return ", ".join(parts)
 
     def columns(self) -> Columns:
         """Return the levels in one-third-octave bands, and those that they should have."""
@@ -344,14 +317,6 @@ def _band_sections() -> tuple[Array, Array, Array]:
     return band_filters(BANDS, RATE)[rated], bands.lower[rated], bands.upper[rated]
 
 
-@lru_cache
-def _weights() -> Array:
-    """Return the factors of the A-weighting in the rated one-third-octave bands."""
-    n_band = len(RATED_BANDS[BANDS])
-    alone = np.where(np.eye(n_band) > 0, 0.0, -MAX_LEVEL)
-    return np.array([10 ** (rating(levels, BANDS).a_weighted / 10) for levels in alone])
-
-
 def _maximum_levels(histories: Array, pressure: Array, n_known: int) -> SoundLevels:
     """Return the maximum levels of histories of the squared pressure, Pa2, (12, n_sample).
 
@@ -360,7 +325,9 @@ def _maximum_levels(histories: Array, pressure: Array, n_known: int) -> SoundLev
     """
     gain = _a_weighting(np.asarray(np.fft.rfftfreq(len(pressure), 1 / RATE), float))
     known = np.fft.irfft(np.fft.rfft(pressure) * gain, len(pressure))
-    weighted = _fast_history(known**2) + _weights()[n_known:] @ histories[n_known:]
+    _, lower, upper = _band_sections()
+    weights = _a_weighting(np.sqrt(lower * upper)[n_known:]) ** 2
+    weighted = _fast_history(known**2) + weights @ histories[n_known:]
     octaves = histories.reshape(-1, 3, histories.shape[1]).sum(axis=1)
     return SoundLevels(_level(histories), _level(octaves), float(_level(weighted)))
 

@@ -77,10 +77,11 @@ class RoomSound(Tabulated):
     def comment(self) -> str:
         """Comment in the file: full scale, contents and limits."""
         pairs = zip(self.starts, self.sounds, strict=True)
-        impacts = "; ".join(f"{start:.3f} s {sound.name}" for start, sound in pairs)
-        sounds = "; ".join(f"{sound.name}: {sound.description}" for sound in self.sounds)
+        impacts = "; ".join(
+            f"{start:.3f} s {sound.name} (ball, microphone {sound.place})" for start, sound in pairs
+        )
         return (
-            f"Sound pressure, full scale {self.full_scale:g} Pa. Impacts: {impacts}. {sounds}. "
+            f"Sound pressure, full scale {self.full_scale:g} Pa. Impacts: {impacts}. "
             f"The sound is {NOTE}."
         )
 

@@ -14,12 +14,15 @@ from thud.base.bridge import ask
 from thud.base.checks import refuse, require_kind, require_whole
 from thud.base.display import Tabulated
 from thud.base.errors import NumericalError, ThudError
+from thud.base.files import replace_file
 from thud.base.note import Note
 from thud.case.case import Case
 from thud.floors.mobility import Mobility, mobility
 from thud.level.levels import get_bands
 
 if TYPE_CHECKING:
+    import os
+
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
@@ -73,23 +76,6 @@ class MobilityFit(Tabulated):
         """Relative error, root mean square over the frequency points."""
         return float(np.sqrt(np.mean(self._errors() ** 2)))
 
-    def band_errors(self) -> dict[float, tuple[float, float]]:
-        """Return errors in the octaves 31.5 to 500 Hz that the measurement covers.
-
-        The keys are mid frequencies, Hz. The values are the root mean square of the relative error,
-        and the level of the fitted − measured real part, which determines the energy into the
-        floor, dB; NaN if a real part is not positive.
-        """
-        result = {}
-        errors = self._errors()
-        frequency = self.measured.frequency
-        pair = self.fitted.values.real, self.measured.values.real
-        for name, inside in _covered(frequency).items():
-            real = [np.trapezoid(values[inside], frequency[inside]) for values in pair]
-            level = 10 * np.log10(real[0] / real[1]) if min(real) > 0 else np.nan
-            result[name] = float(np.sqrt(np.mean(errors[inside] ** 2))), float(level)
-        return result
-
     @property
     def notes(self) -> tuple[Note, ...]:
         """Warnings on the measurement and the fit."""
@@ -102,13 +88,31 @@ class MobilityFit(Tabulated):
         return tuple(result)
 
     def columns(self) -> Columns:
-        """Return the errors in octaves."""
-        errors = np.array([*self.band_errors().values()])
+        """Return errors in the octaves 31.5 to 500 Hz that the measurement covers.
+
+        They are the root mean square of the relative error, and the level of the fitted − measured
+        real part, which determines the energy into the floor; NaN if a real part is not positive.
+        """
+        frequency, errors = self.measured.frequency, self._errors()
+        bands = _covered(frequency)
+        levels = []
+        for inside in bands.values():
+            fitted, measured = (
+                float(np.trapezoid(curve.values.real[inside], frequency[inside]))
+                for curve in (self.fitted, self.measured)
+            )
+            is_known = min(fitted, measured) > 0
+            levels.append(10 * np.log10(fitted / measured) if is_known else np.nan)
+        relative = [100 * np.sqrt(np.mean(errors[inside] ** 2)) for inside in bands.values()]
         return {
-            "octave, Hz": (np.array([*self.band_errors()]), "g"),
-            "error, %": (100 * errors[:, 0], ".2g"),
-            "real part, dB": (errors[:, 1], "+z.2f"),
+            "octave, Hz": (np.array([*bands]), "g"),
+            "error, %": (relative, ".2g"),
+            "real part, dB": (levels, "+z.2f"),
         }
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write `namelist` to a file."""
+        replace_file(path, self.namelist().encode())
 
     def namelist(self) -> str:
         """Return the groups ``&floor`` and ``&measured_mobility`` as text for a case."""

@@ -38,8 +38,6 @@ if TYPE_CHECKING:
     from thud.base.note import Note
 
 MAX_THREADS = 1024
-# Results that are truth values.
-_FLAGS = {"conforms", *(f"{force}_conforms" for force in FORCES)}
 # Maximum number of values of one call of the library, for its memory, and of one sample without its
 # forces.
 _MAX_VALUES = 2**26
@@ -75,8 +73,6 @@ class Ensemble(SampleQuantities, Displayed):
         outside the limits.
     conforms : ndarray of bool, shape (n_sample,)
         Whether all criteria are met with the force that the case assesses.
-    elastic_conforms, floor_conforms : ndarray of bool, shape (n_sample,)
-        Whether all criteria are met with the elastic force, and with the force on the floor.
     elastic_force, floor_force : ndarray, shape (n_sample, n_time), or None
         Forces, N; None unless requested.
     sample_rate : float
@@ -101,8 +97,6 @@ class Ensemble(SampleQuantities, Displayed):
     floor_octave: NDArray[np.float64]
     margin: NDArray[np.float64]
     conforms: NDArray[np.bool_]
-    elastic_conforms: NDArray[np.bool_]
-    floor_conforms: NDArray[np.bool_]
     sample_rate: float
     elastic_third: NDArray[np.float64] | None = None
     floor_third: NDArray[np.float64] | None = None
@@ -280,9 +274,10 @@ def _compute(  # noqa: PLR0913 - the arguments of the library
         key_count=len(names), values=numbers.T, threads=threads, levels=levels, forces=forces,
     )  # fmt: skip
     reasons = answer.pop("reasons").split("\n")[:-1]
-    results = {
-        name: values.T != 0 if name in _FLAGS else values.T for name, values in answer.items()
-    }
+    for force in FORCES:
+        answer.pop(f"{force}_conforms")
+    results = {name: values.T for name, values in answer.items()}
+    results["conforms"] = results["conforms"] != 0
     results["status"] = results["status"].astype(np.int32)
     results["reason"] = np.full(len(numbers), "", dtype=object)
     results["reason"][results["status"] != 0] = reasons

@@ -11,12 +11,15 @@ import numpy as np
 from thud.base._schema import QUANTITIES, ImpactQuantities
 from thud.base.checks import require_choice
 from thud.base.extras import data_frame
+from thud.base.files import replace_file
 from thud.impact.contact_time import contact_span
 from thud.level.assessment import ImpactOrRecording, assess_levels
 from thud.level.estimate import Estimate
 from thud.level.levels import FORCES, force_exposure_levels, peak_count
 
 if TYPE_CHECKING:
+    import os
+
     import pandas as pd
     import xarray as xr
     from matplotlib.figure import Figure
@@ -220,6 +223,10 @@ class Impact(ImpactQuantities, ImpactOrRecording):
         Raise InputError if pandas is not installed.
         """
         return data_frame(self.histories(), self.time)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the table of `to_dataframe` as CSV, replacing an existing file."""
+        replace_file(path, self.to_dataframe().to_csv().encode())
 
     def histories(self) -> dict[str, NDArray[np.float64]]:
         """Return the histories, shape (n_sample,), by names that end with units."""
