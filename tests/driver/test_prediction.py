@@ -177,14 +177,6 @@ def test_prediction_is_held_against_measured_levels(shell: thud.Impact) -> None:
         found.difference(octaves)
 
 
-@pytest.mark.parametrize("name", ["concrete_140", "concrete_180", "concrete_220"])
-def test_inputs_of_floors_are_cases(name: str) -> None:
-    case = thud.read_case(FLOORS / f"{name}.nml")
-    assert isinstance(case.floor, thud.Plate)
-    assert case.floor.thickness == int(name[-3:]) / 1000
-    assert case.room == thud.Room(volume=50.0)
-
-
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -310,19 +302,6 @@ def test_impact_on_the_floor_itself_is_of_the_contact_force() -> None:
     other = thud.Plate(thickness=0.03, density=600, wave_speed=2500)
     change = thud.predict_level(impact.on_floor, other, room).force_change
     assert change == pytest.approx(thud.predict_level(impact, other, room).force_change, abs=1e-4)
-
-
-def test_tapping_level_of_an_orthotropic_plate_is_refused() -> None:
-    with pytest.raises(thud.InputError, match=naming("isotropic")):
-        thud.tapping_level(thud.Plate(stiffness_ratio=0.1))
-
-
-def test_floor_radiates_no_more_than_it_loses(shell: thud.Impact) -> None:
-    # So light a plate loses less to the laboratory than it radiates.
-    light = thud.Plate(length=6, width=4, thickness=0.1, density=45, wave_speed=4600)
-    share = thud.predict_level(shell, light, thud.Room()).radiated_share
-    assert (share > 0.4).any()
-    assert (share <= 0.5).all()
 
 
 def test_share_that_is_radiated_is_that_of_one_side() -> None:

@@ -129,14 +129,6 @@ def test_titles_of_other_levels_are_refused(tmp_path: Path, titles: str, name: s
         thud.read_room_levels(write(tmp_path, "\n".join([titles, *rows])))
 
 
-@pytest.mark.parametrize("separator", [",", ", ", " , ", "; ", "\t "])
-def test_blanks_beside_separators_change_no_level(tmp_path: Path, separator: str) -> None:
-    path = tmp_path / "levels.csv"
-    rows = [("frequency", "level"), ("63", "65.100"), ("125", "64.2"), ("250", "50"), ("500", "40")]
-    path.write_text("".join(f"{separator.join(row)}\n" for row in rows))
-    assert thud.read_room_levels(path).measured.tolist() == [65.1, 64.2, 50, 40]
-
-
 def test_mean_background_and_scatter_of_positions(tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
     levels = 60 + 3 * rng.standard_normal((6, 4))
