@@ -95,7 +95,7 @@ RESULTS: dict[str, Callable[[], Figure]] = {
     "floor_modes": lambda: plate_modes(prediction().floor),
     "floors": floors,
     "law_of_loss": lambda: study("sweep", "law_of_loss").plot(),
-    "modal_room": lambda: thud.modal_room(prediction().source).plot(),
+    "modal_room": lambda: thud.modal_room(prediction()).plot(),
     "plate_velocity": plate_velocity,
     "room_levels": lambda: thud.read_room_levels(
         INPUTS / "floors/field_levels.csv", volume=41.4

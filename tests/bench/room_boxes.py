@@ -169,7 +169,9 @@ def main() -> None:
                 elastic = with_edges(simple, float(np.exp(draw.uniform(*np.log(ROTATION)))))
                 truths = []
                 for one in (elastic, simple):
-                    modal = thud.modal_room(ball, one, other, max_frequency=options.highest)
+                    modal = thud.modal_room(
+                        thud.predict_level(ball, one, other), max_frequency=options.highest
+                    )
                     truths.append(np.append(modal.mean, modal.prediction.level[len(modal.mean) :]))
                 found.append([known.level, known.simple_level, *truths, draw.choice(balls)])
                 uncertainties.append([predicted.uncertainty, predicted.contributions["model"]])

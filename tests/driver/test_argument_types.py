@@ -62,7 +62,7 @@ def calls(folder: Path) -> list[tuple[Callable[..., Any], dict[str, Any]]]:
         (thud.standardized_level, {"level": [50.0], "reverberation_time": [0.5], "volume": 50.0}),
         (thud.blocked_force, {"source": impact, "drop": 1}),
         (thud.listen, {"predictions": thud.predict_level(on_floor)}),
-        (thud.modal_room, {"source": on_floor, "max_frequency": 60.0}),
+        (thud.modal_room, {"prediction": thud.predict_level(on_floor), "max_frequency": 60.0}),
         (thud.compress, {"points": 5}),
         (thud.assess_levels, {"levels": impact.levels().tolist(), "mass": 2.5, "peaks": 1}),
         (thud.solve_many, {"parameters": {"height": [1.0]}}),

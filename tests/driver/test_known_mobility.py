@@ -66,7 +66,7 @@ def test_one_point_has_the_modes_of_its_plate_in_the_room(floor: thud.MeasuredMo
     assert known.n_modal == thud.predict_level(floor=PLATE, room=ROOM).n_modal > 0
     assert known.has_edges
     with pytest.raises(thud.InputError, match=naming("this floor has no modes")):
-        thud.modal_room(known.source, floor, ROOM)
+        thud.modal_room(known)
 
 
 def test_plate_takes_over_outside_the_measurement(floor: thud.MeasuredMobility) -> None:

@@ -88,7 +88,7 @@ def test_levels_by_another_instrument_are_those_predicted(
     (only,) = sound.sounds
     n = prediction.n_modal
     assert 0 < n < 12
-    room = thud.modal_room(prediction.source, FLOORS[name], ROOM)
+    room = thud.modal_room(prediction)
     i, j = np.array(only.position) - 1
     modal = room.pressure[i, j]
     modal = resample(modal, round(len(modal) * RATE / room.sample_rate))
@@ -192,7 +192,7 @@ def test_file_states_scale_contents_and_limits(found: thud.RoomSound, tmp_path: 
 
 def test_position_is_chosen(predictions: dict[str, thud.RoomPrediction]) -> None:
     prediction = predictions["concrete"]
-    room = thud.modal_room(prediction.source, FLOORS["concrete"], ROOM)
+    room = thud.modal_room(prediction)
     (sound,) = thud.listen(prediction).sounds
     distance = np.linalg.norm(room.level - room.mean, axis=2)
     i, j = np.array(sound.position) - 1

@@ -22,7 +22,9 @@ MICROPHONE = np.array([3.1, 0.9, 1.4])
 @pytest.fixture(scope="module")
 def room(shell: thud.Impact) -> thud.ModalRoom:
     """Return the levels of one pair of positions."""
-    return thud.modal_room(shell, FLOOR, ROOM, balls=[BALL], microphones=[MICROPHONE])
+    return thud.modal_room(
+        thud.predict_level(shell, FLOOR, ROOM), balls=[BALL], microphones=[MICROPHONE]
+    )
 
 
 def test_bands_end_where_three_modes_overlap(room: thud.ModalRoom) -> None:
@@ -49,14 +51,16 @@ def test_orthotropic_plate_has_the_modes_that_the_source_feels() -> None:
 
 
 def test_positions_are_those_of_the_room_or_stated(shell: thud.Impact) -> None:
-    standard = thud.modal_room(shell, FLOOR, replace(ROOM, positions="standard"))
+    standard = thud.modal_room(
+        thud.predict_level(shell, FLOOR, replace(ROOM, positions="standard"))
+    )
     assert standard.level.shape == (5, 5, len(standard.frequency))
     # Center, and four points 0.75 m from the walls; microphones 1.2 m high.
     assert standard.balls[0] == pytest.approx(SIZE[:2] / 2)
     assert standard.balls[1] == pytest.approx([0.75, 0.75])
     assert standard.balls[4] == pytest.approx(SIZE[:2] - 0.75)
     assert standard.microphones[:, 2] == pytest.approx([1.2] * 5)
-    even = thud.modal_room(shell, FLOOR, replace(ROOM, positions="even"))
+    even = thud.modal_room(thud.predict_level(shell, FLOOR, replace(ROOM, positions="even")))
     assert even.level.shape[:2] == (16, 16)
     for positions, sides in ((even.balls, SIZE[:2]), (even.microphones, SIZE)):
         assert (positions >= 0.5 - 1e-12).all()
@@ -66,7 +70,7 @@ def test_positions_are_those_of_the_room_or_stated(shell: thud.Impact) -> None:
 
 
 def test_mean_of_positions_is_the_modal_level_of_the_prediction(shell: thud.Impact) -> None:
-    room = thud.modal_room(shell, FLOOR, ROOM)
+    room = thud.modal_room(thud.predict_level(shell, FLOOR, ROOM))
     energies = 10 ** (room.level / 10)
     assert room.mean == pytest.approx(10 * np.log10(energies.mean(axis=(0, 1))))
     assert room.spread == pytest.approx(room.level.std(axis=(0, 1)))
@@ -96,7 +100,10 @@ def test_what_has_no_modal_answer_is_refused(
     shell: thud.Impact, settings: dict[str, object], words: str
 ) -> None:
     with pytest.raises(thud.InputError, match=words):
-        thud.modal_room(shell, **{"floor": FLOOR, "room": ROOM} | settings)  # type: ignore[arg-type]
+        thud.modal_room(
+            thud.predict_level(shell, settings.pop("floor", FLOOR), settings.pop("room", ROOM)),  # type: ignore[arg-type]
+            **settings,  # type: ignore[arg-type]
+        )
 
 
 def test_pressure_has_the_levels(room: thud.ModalRoom) -> None:
@@ -134,7 +141,11 @@ def test_figures_show_positions_and_shapes(room: thud.ModalRoom) -> None:
 def test_walls_and_ceiling_are_left_out(room: thud.ModalRoom) -> None:
     other = replace(room.prediction.room, wall_lengths=(3.0, 2.0), ceiling_mass=20.0)
     both = [
-        thud.modal_room(room.prediction.source, FLOOR, r, balls=[BALL], microphones=[MICROPHONE])
+        thud.modal_room(
+            thud.predict_level(room.prediction.source, FLOOR, r),
+            balls=[BALL],
+            microphones=[MICROPHONE],
+        )
         for r in (ROOM, other)
     ]
     np.testing.assert_array_equal(both[0].level, both[1].level)
@@ -155,11 +166,11 @@ def test_positions_on_a_wall_below_are_no_samples(shell: thud.Impact) -> None:
     """The middle of the standard positions lies on the wall, where the ball moves nothing."""
     slab = thud.Plate(line_x=(2.5,), source_x=0.2)
     found = thud.predict_level(shell, slab, thud.Room(height=2.5, positions="standard"))
-    levels = thud.modal_room(found.source).level
+    levels = thud.modal_room(found).level
     on_wall = levels.max(axis=(1, 2)) < levels.max() - 100
     assert on_wall.any()
     kept = 10 ** (levels[~on_wall] / 10)
-    assert thud.modal_room(found.source).mean == pytest.approx(
+    assert thud.modal_room(found).mean == pytest.approx(
         10 * np.log10(kept.mean(axis=(0, 1))), abs=1e-6
     )
 
@@ -186,8 +197,8 @@ def test_improvement_by_a_covering_is_left_out() -> None:
     room = thud.Room(volume=50.0)
     plain = thud.Plate(thickness=0.18)
     covered = replace(plain, covering_improvement=(10.0, 15.0, 20.0, 25.0))
-    bare = thud.modal_room(thud.solve(floor=plain, room=room))
-    found = thud.modal_room(thud.solve(floor=covered, room=room))
+    bare = thud.modal_room(thud.predict_level(thud.solve(floor=plain, room=room)))
+    found = thud.modal_room(thud.predict_level(thud.solve(floor=covered, room=room)))
     assert found.mean == pytest.approx(bare.mean)
 
 

@@ -89,7 +89,7 @@ print(chosen := floors[1].name, thud.mobility(floors[2], [25.0]).values, moved.d
 name: thud.FloorName = chosen
 floor, room = thud.Plate(thickness=0.2), thud.Room(volume=40.0)
 below: thud.RoomPrediction = thud.predict_level(flagship, floor, room)
-places: thud.ModalRoom = thud.modal_room(flagship, floor, room)
+places: thud.ModalRoom = thud.modal_room(thud.predict_level(flagship, floor, room))
 tapping: thud.TappingLevel = thud.tapping_level(floor)
 library: dict[str, thud.Construction] = thud.constructions("concrete 180")
 deck: thud.Construction = thud.construction(next(iter(library)))

@@ -64,7 +64,7 @@ def calls() -> dict[str, Call]:
         "modal_room": Call(
             [[[1.0, 1.5]], [[1.0, 1.0, 1.0], [2.0, 1.0, 1.2]]],
             lambda balls, microphones: thud.modal_room(
-                impact, PLATE, ROOM, balls=balls, microphones=microphones
+                thud.predict_level(impact, PLATE, ROOM), balls=balls, microphones=microphones
             ),
         ),
         "fit_compression": Call(

@@ -113,7 +113,7 @@ def slow_calls(folder: Path) -> Calls:
         "sets of elements": lambda: (
             thud.solve_many({"height": [0.9, 1.0]}, model="finite_element", threads=2).peak_force
         ),
-        "modal_room": lambda: str(thud.modal_room(impact, PLATE, ROOM)),
+        "modal_room": lambda: str(thud.modal_room(thud.predict_level(impact, PLATE, ROOM))),
         "listen": lambda: thud.listen(thud.predict_level(impact, PLATE, ROOM)).wav(),
         "compare": lambda: thud.compare([impact, thud.solve(model="modal_ball")]).rows(),
         "compare_floors": lambda: str(
@@ -182,7 +182,7 @@ def changing_calls(folder: Path) -> dict[str, Callable[[random.Random], object]]
 
     def modal_room(chance: random.Random) -> object:
         space = thud.Room(volume=chance.uniform(20, 60))
-        return thud.modal_room(impact, PLATE, space, balls=1, microphones=2)
+        return thud.modal_room(thud.predict_level(impact, PLATE, space), balls=1, microphones=2)
 
     impact = thud.solve()
     return {

@@ -97,7 +97,9 @@ def test_modal_rooms_hear_the_losses_of_layers(
     ball = np.array([1.3, 1.7])
     microphones = 0.5 + np.random.default_rng(1).random((8, 3)) * (4.0, 3.0, 1.5)
     source = thud.solve(model="modal_ball", floor=floor)
-    found = thud.modal_room(source, floor, room, balls=[ball], microphones=microphones)
+    found = thud.modal_room(
+        thud.predict_level(source, floor, room), balls=[ball], microphones=microphones
+    )
     history = found.prediction.source
     force = np.interp(np.arange(count) / rate, history.time, history.force("floor"), right=0.0)
     frequency = np.fft.rfftfreq(count, 1 / rate)

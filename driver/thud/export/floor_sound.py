@@ -16,7 +16,7 @@ from thud.base._schema import RATED_BANDS
 from thud.base.checks import refuse_value, require_whole
 from thud.base.display import Tabulated
 from thud.base.note import Note
-from thud.floors.modal_room import positions_below
+from thud.floors.modal_room import modal_room
 from thud.floors.prediction import BANDS, RoomPrediction
 from thud.level.levels import get_bands
 from thud.recordings.filters import band_filters
@@ -24,6 +24,8 @@ from thud.recordings.filters import band_filters
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.base.display import Columns
@@ -137,6 +139,12 @@ class FloorSound(Tabulated):
             "reference, dB": (self.reference.third, ".1f"),
         }
 
+    def plot(self, ax: Axes | None = None) -> Figure:
+        """Draw the levels, in a new figure or the stated axes."""
+        from thud.plot.room_figures import draw_floor_sound
+
+        return draw_floor_sound(self, ax)
+
 
 def new_floor_sound(
     name: str, prediction: RoomPrediction, position: tuple[int, int] | None, seed: int
@@ -198,7 +206,7 @@ def _modal_pressure(
     prediction: RoomPrediction, position: tuple[int, int] | None
 ) -> tuple[tuple[int, int], Array]:
     """Return the numbers of a position and the sound pressure of the modes there, Pa, at `RATE`."""
-    room = positions_below(prediction)
+    room = modal_room(prediction)
     if position is None:
         distance = ((room.level - room.mean) ** 2).sum(axis=2)
         # Positions that are equal by symmetry differ by rounding: the first of them is chosen.

@@ -14,7 +14,7 @@ import numpy as np
 
 from thud.base._schema import RectangularFloor
 from thud.base.bridge import ask
-from thud.base.checks import refuse, refuse_value, require_array, require_number
+from thud.base.checks import refuse, refuse_value, require_array, require_kind, require_number
 from thud.base.display import Tabulated
 from thud.case.case import case_text
 from thud.floors.prediction import RoomPrediction, predict_level
@@ -24,9 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
-    from thud.base._schema import FloorOptions, Room
     from thud.base.display import Columns
-    from thud.recordings.recording import ImpactResult
+    from thud.base.note import Note
 
     Array = NDArray[np.float64]
 
@@ -82,6 +81,11 @@ class ModalRoom(Tabulated):
     pressure: Array
     sample_rate: float
 
+    @property
+    def notes(self) -> tuple[Note, ...]:
+        """Warnings of the prediction."""
+        return self.prediction.notes
+
     def columns(self) -> Columns:
         """Return the levels in bands."""
         return {
@@ -108,28 +112,23 @@ class ModalRoom(Tabulated):
         )
 
 
-def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in them
-    source: ImpactResult,
-    floor: FloorOptions | None = None,
-    room: Room | None = None,
+def modal_room(
+    prediction: RoomPrediction,
     *,
     balls: ArrayLike | None = None,
     microphones: ArrayLike | None = None,
     max_frequency: float | None = None,
 ) -> ModalRoom:
-    """Compute modal levels below a floor for pairs of positions, up to the crossover of the room.
+    """Compute the modal levels of a prediction for pairs of positions, up to the crossover.
 
-    Walls and ceilings of `room` and a stated improvement by a covering are left out, in the
-    prediction beside it, too. The energy of floor modes decays at the rate omega eta, the energy of
-    room modes at 6 ln 10/T.
+    Walls and ceilings of its room and a stated improvement by a covering are left out, in
+    `ModalRoom.prediction`, too. The energy of floor modes decays at the rate omega eta, the energy
+    of room modes at 6 ln 10/T.
 
     Parameters
     ----------
-    source
-        Impact of any model, or a recording. As in `predict_level`, the force is that on the
-        floor, or that on a rigid floor if the model has no other.
-    floor, room
-        Floor and room; by default those of the impact's case.
+    prediction
+        Impact, floor and room.
     balls : array_like, shape (n_ball, 2), optional
         Positions of the ball from the corner of the room, m; by default those of
         ``room.positions``.
@@ -139,30 +138,12 @@ def modal_room(  # noqa: PLR0913 - an impact, a floor, a room, and positions in 
         Highest mid frequency of a band, Hz; by default the crossover. Bands that would take too
         long are left out.
 
-    Returns
-    -------
-    ModalRoom
-        Maximum Fast levels for each pair of positions.
-
     Raises
     ------
     InputError
         If the floor has no modes, a position is outside, or no band lies below `max_frequency`.
     """
-    prediction = predict_level(source, floor, room)
-    return positions_below(
-        prediction, balls=balls, microphones=microphones, max_frequency=max_frequency
-    )
-
-
-def positions_below(
-    prediction: RoomPrediction,
-    *,
-    balls: ArrayLike | None = None,
-    microphones: ArrayLike | None = None,
-    max_frequency: float | None = None,
-) -> ModalRoom:
-    """Compute the `modal_room` for the impact, floor and room of a prediction."""
+    require_kind("prediction", prediction, RoomPrediction)
     room = replace(prediction.room, wall_lengths=(), ceiling_mass=0.0)
     floor = prediction.floor
     if isinstance(floor, RectangularFloor):

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from thud.export.floor_sound import FloorSound
     from thud.export.room_sound import RoomSound
     from thud.floors.modal_room import ModalRoom
     from thud.floors.prediction import RoomPrediction
@@ -154,9 +155,19 @@ def draw_sound(sound: RoomSound, ax: Axes | None = None) -> Figure:
 
 
 @own_style()
+def draw_floor_sound(sound: FloorSound, ax: Axes | None = None) -> Figure:
+    """Draw the levels of a sound, and those that it should have."""
+    axes = own_or(ax, 2.4)
+    levels = {"sound": sound.level.third, "prediction": sound.reference.third}
+    add_levels(axes, levels, "third", sound.prediction.frequency, 3.5)
+    axes.set_ylabel(FAST_LEVEL)
+    return finish(axes, ax)
+
+
+@own_style()
 def draw_positions(prediction: RoomPrediction) -> Figure | None:
     """Draw the levels of positions below a floor; None if no band is modal."""
     # Imported late: modal_room imports the prediction.
-    from thud.floors.modal_room import positions_below
+    from thud.floors.modal_room import modal_room
 
-    return draw_modal_room(positions_below(prediction)) if prediction.n_modal else None
+    return draw_modal_room(modal_room(prediction)) if prediction.n_modal else None
