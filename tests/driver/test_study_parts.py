@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,6 @@ from thud.studies import sampling
 from thud.studies.design import KIND as DESIGN, Design, _mark
 from thud.studies.parameter import MAX_VALUES, Parameter, read_varied
 from thud.studies.sensitivity import sobol_indices
-from thud.studies.surrogate_levels import SurrogateLevels, within_region
 from thud.studies.temperature import Temperature, read_temperature
 from thud.studies.uncertainty import Uncertainty
 
@@ -309,45 +307,3 @@ def test_mark_of_a_map_is_the_standard_ball_or_the_case(
     assert (name == "standard ball") == is_standard
 
 
-# What `SurrogateLevels` takes of a comparison with levels.
-MISFIT: dict[str, Any] = {
-    "kind": "floor", "bands": "octave", "known_noise": True, "indices": np.array([1, 3]),
-    "extra": ("contact_time", "restitution"), "target": np.array([40.0, 20.0, 0.02, 0.8]),
-    "deviation": np.array([0.1, 0.2, 1e-5, 0.01]),
-}  # fmt: skip
-
-
-class _Answers:
-    """A surrogate of the force on the floor."""
-
-    outputs = {"floor_octave": 5, "contact_time": 1, "restitution": 1}  # noqa: RUF012
-
-
-def test_surrogates_without_the_force_are_refused() -> None:
-    with pytest.raises(thud.InputError, match="elastic_octave"):
-        SurrogateLevels(
-            SimpleNamespace(**{**MISFIT, "kind": "elastic"}),  # type: ignore[arg-type]
-            _Answers(), thud.Case(),  # type: ignore[arg-type]
-        )  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("low", "high", "start", "expected"),
-    [(0.0, 9.0, 2.0, (1, 3)), (1.5, 9.0, 2.0, (1.5, 3)), (0.0, 2.5, 2.0, (1, 2.5)),
-     (0.0, 9.0, 1.0, None), (0.0, 9.0, 3.0, None), (0.0, 9.0, 4.0, None)],
-)  # fmt: skip
-def test_search_stays_within_the_region(
-    low: float, high: float, start: float, expected: tuple[float, float] | None
-) -> None:
-    from thud.studies.fitting.ranges import Range
-
-    blank = dict.fromkeys(Range.__dataclass_fields__)
-    entry = Range(**{**blank, "name": "b", "unit": "m", "low": low, "high": high, "start": start,
-                     "spread": (low, high)})  # type: ignore[arg-type]  # fmt: skip
-    answers = SimpleNamespace(keys=("a", "b"), region=np.array([[0.0, 9.0], [1.0, 3.0]]))
-    if expected is None:
-        with pytest.raises(thud.InputError, match="start"):
-            within_region(entry, answers)  # type: ignore[arg-type]
-    else:
-        found = within_region(entry, answers)  # type: ignore[arg-type]
-        assert (found.low, found.high) == found.spread == expected

@@ -454,51 +454,6 @@ def test_drops_without_result_are_refused() -> None:
         thud.surrogate(study)
 
 
-@pytest.mark.parametrize("known", [True, False])
-def test_fits_by_a_surrogate_are_those_of_the_model(known: bool) -> None:  # noqa: FBT001
-    learned = thud.surrogate({
-        "name": "shells", "fixed": {"model": "hollow_sphere"}, "surrogate": {"size": 64},
-        "parameters": {"youngs_modulus": {"low": 1.6e6, "high": 2e6},
-                       "height": {"low": 0.95, "high": 1.05}},
-    })  # fmt: skip
-    # Its errors exceed the uncertainty of the target.
-    truth = replace(learned.case, ball=thud.Ball(youngs_modulus=1.77e6), drop=thud.Drop(height=1.0))
-    noise = np.random.default_rng(1).normal(0, 1e-4, 5)
-    levels = (thud.solve(truth).levels() + noise).tolist()
-    target = thud.LevelTarget(levels, 1e-4 if known else None)
-    starts = {"youngs_modulus": 1.85e6, "height": 1.01}
-    found = thud.fit(target, starts, truth, surrogate=learned)
-    expected = thud.fit(target, starts, truth)
-    assert found.converged
-    np.testing.assert_allclose(found.estimate, expected.estimate, rtol=1e-7)
-    np.testing.assert_allclose(found.covariance, expected.covariance, rtol=1e-3)
-    columns = found.to_dataframe()
-    deviation = columns["uncertainty"] if known else found.noise
-    np.testing.assert_allclose(found.residuals, columns["residual"] / deviation)
-    np.testing.assert_array_equal(found.impact.floor_force, thud.solve(found.case).floor_force)
-
-
-def test_fits_refuse_what_a_surrogate_does_not_know(trained: thud.Surrogate) -> None:
-    case = trained.case
-    levels = thud.LevelTarget([39, 31, 23, 17, 12.5], 0.5)
-    with pytest.raises(thud.InputError, match=naming("surrogate", "force")):
-        thud.fit(thud.solve(case), {"height": 1.0}, case, surrogate=trained)
-    with pytest.raises(thud.InputError, match=naming("mass", "surrogate")):
-        thud.fit(levels, {"mass": 2.5}, case, surrogate=trained)
-    with pytest.raises(thud.InputError, match=naming("height", "start", 0.9, 0.98)):
-        thud.fit(levels, {"height": 0.9}, case, surrogate=trained)
-    with pytest.raises(thud.InputError, match=naming("[surrogate]", "file")):
-        thud.read_study(
-            {
-                "fixed": FIXED,
-                "target": {"levels": [39, 31, 23, 17, 12.5]},
-                "parameters": {"height": {}},
-                "surrogate": {},
-            },
-            "fit",
-        )
-
-
 def test_fewest_drops_are_those_of_the_order_statistic() -> None:
     # The largest of n bounds 95 % with a confidence of 1 - 0.95**n.
     fewest = math.ceil(math.log(0.05) / math.log(0.95))

@@ -25,11 +25,8 @@ from thud.studies.fitting.read_target import Target, read_target
 from thud.studies.fitting.search import search
 from thud.studies.kind import Kind
 from thud.studies.study import Study, fix_keys, table_of, with_density
-from thud.studies.surrogate_levels import surrogate_misfit, within_region
-from thud.studies.trained_surrogate import Surrogate, get_surrogate, stated_surrogate
 
 if TYPE_CHECKING:
-    import os
     from collections.abc import Iterable, Sequence, Set as AbstractSet
     from pathlib import Path
 
@@ -65,7 +62,6 @@ def fit(  # noqa: PLR0913 - options of a search
     seed: int = 0,
     max_steps: int = 100,
     unknowns: Sequence[str] = tuple(UNKNOWNS),
-    surrogate: Surrogate | str | os.PathLike[str] | None = None,
     progress: bool = False,
 ) -> Fit:
     """Estimate parameters of a model from a force history or from levels, by least squares.
@@ -95,9 +91,6 @@ def fit(  # noqa: PLR0913 - options of a search
     unknowns
         What is not known of the ball or the floor of a force: intervals include what the force does
         not exclude; none: the case is trusted.
-    surrogate
-        A surrogate, or the path of its file, that predicts levels instead of the model until the
-        search has converged; from there the model continues, and all results are the model's.
     progress
         Show the number of computed impacts.
 
@@ -132,8 +125,7 @@ def fit(  # noqa: PLR0913 - options of a search
     _require_options(options)
     bound = bound_parameters(case, parameters)
     pairs = _pairs(case, _targets(target), {parameter.name for parameter in bound})
-    trained = None if surrogate is None else get_surrogate(surrogate)
-    result = _search(pairs, get_ranges(case, bound), options, trained, progress=progress)
+    result = _search(pairs, get_ranges(case, bound), options, progress=progress)
     for note in result.warnings:
         warnings.warn(FitWarning(note), stacklevel=3)
     return result
@@ -178,20 +170,9 @@ def _search(
     pairs: list[tuple[Case, Misfit]],
     ranges: list[Range],
     options: Mapping[str, Any],
-    surrogate: Surrogate | None,
     *,
     progress: bool,
 ) -> Fit:
-    if surrogate is not None:
-        predicted = _with_surrogate(pairs, surrogate, ranges)
-        inside = [within_region(entry, surrogate) for entry in ranges]
-        values = search(predicted, inside, options, progress=progress).values
-        # Rounding may move a value at a limit beyond it.
-        ranges = [
-            replace(entry, start=min(max(values[entry.name], entry.low), entry.high))
-            for entry in ranges
-        ]
-        options = {**options, "starts": 1}
     pairs = [(_with_mesh(case, misfit, ranges), misfit) for case, misfit in pairs]
     return search(pairs, ranges, options, progress=progress)
 
@@ -217,14 +198,6 @@ def _with_mesh(case: Case, misfit: Misfit, ranges: list[Range]) -> Case:
     return replace(case, model=mesh)
 
 
-def _with_surrogate(
-    pairs: list[tuple[Case, Misfit]], surrogate: Surrogate, parameters: Iterable[Range | Parameter]
-) -> list[tuple[Case, Misfit]]:
-    """Return pairs whose levels a surrogate predicts."""
-    names = [parameter.name for parameter in parameters]
-    return [(case, surrogate_misfit(misfit, surrogate, case, names)) for case, misfit in pairs]
-
-
 def _require_options(options: Mapping[str, Any]) -> None:
     require_confidence(options["confidence"])
     require_whole("starts", options["starts"], 1, _MAXIMUM)
@@ -240,7 +213,6 @@ class FitStudy(Study):
     targets: tuple[Target, ...] = ()
     tables: dict[str, Any] = field(default_factory=dict)
     options: dict[str, Any] = field(default_factory=lambda: dict(OPTIONS))
-    surrogate: Surrogate | None = None
 
     def kind_settings(self) -> dict[str, str]:
         """Return the settings of targets and search."""
@@ -253,8 +225,6 @@ class FitStudy(Study):
             result |= {f"[target{end}] {key}": f"{value!r}" for key, value in table.items()}
             digest = hashlib.sha256(misfit.data().tobytes()).hexdigest()[:16]
             result[f"numbers of [target{end}]"] = digest
-        if self.surrogate:
-            result["surrogate"] = self.surrogate.digest
         return result | {name: f"{value!r}" for name, value in self.options.items()}
 
     def pairs(self) -> list[tuple[Case, Misfit]]:
@@ -266,7 +236,7 @@ class FitKind(Kind[FitStudy, Fit]):
     """Fits as a kind of study."""
 
     name = "fit"
-    own_keys = ("target", "surrogate", *OPTIONS)
+    own_keys = ("target", *OPTIONS)
 
     def new_parameter(self, name: str, entry: object, case: Case, density: object) -> Parameter:  # noqa: ARG002
         """Return a parameter that is fitted."""
@@ -294,14 +264,7 @@ class FitKind(Kind[FitStudy, Fit]):
         common = {**vars(study), "case": case}
         result = FitStudy(**common, targets=targets, tables=shown, options=options)
         result.pairs()
-        if "surrogate" not in content:
-            return result
-        return self.with_surrogate(result, stated_surrogate(table_of(content, "surrogate"), folder))
-
-    def with_surrogate(self, study: FitStudy, trained: Surrogate) -> FitStudy:
-        """Return a study whose levels a surrogate predicts; raise InputError if it cannot."""
-        _with_surrogate(study.pairs(), trained, study.parameters)
-        return replace(study, surrogate=trained)
+        return result
 
     def compute(
         self,
@@ -314,7 +277,6 @@ class FitKind(Kind[FitStudy, Fit]):
             study.pairs(),
             get_ranges(study.case, study.parameters),
             study.options,
-            study.surrogate,
             progress=options.get("progress", False),
         )
 
