@@ -19,7 +19,7 @@ from conftest import REPOSITORY, names_in, naming
 
 import thud
 from thud import cli
-from thud.studies import fit, samples
+from thud.studies import samples
 from thud.studies.blocks import Blocks
 from thud.studies.dataset import disk_space
 from thud.studies.sweep import KIND
@@ -203,11 +203,6 @@ def test_files_of_something_else_are_replaced_on_request_only(tmp_path: Path) ->
         thud.sweep(HEIGHTS, tmp_path)
     assert (tmp_path / "python.nc").read_text() == "a paper"
     assert thud.sweep(HEIGHTS, tmp_path, replace=True).dataset.sizes["height"] == 2
-    (tmp_path / "fit.json").write_text("[]")
-    study = {"target": {"levels": [39, 31, 23, 17, 12]}, "parameters": {"mass": {}}}
-    with pytest.raises(thud.InputError, match=naming("fit.json", "--replace")):
-        fit.KIND.run(study, tmp_path)
-    assert (tmp_path / "fit.json").read_text() == "[]"
 
 
 @pytest.mark.parametrize("name", ["python.partial", "python.nc"])

@@ -71,14 +71,8 @@ def test_level_target_has_no_ellipse_of_one_parameter() -> None:
 
 
 @pytest.mark.parametrize("freedom", [None, 7, 40])
-@pytest.mark.parametrize("known", [True, False])
-def test_ellipse_is_the_joint_confidence_region(
-    known: bool,  # noqa: FBT001
-    freedom: int | None,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_ellipse_is_the_joint_confidence_region(freedom: int | None) -> None:
     fit = fit_with_noise(5.0, "youngs_modulus", "height")
-    monkeypatch.setattr(fit.misfit, "noise_freedom", freedom)
     pair = dataclasses.replace(
         fit,
         names=fit.names[:2],
@@ -86,13 +80,12 @@ def test_ellipse_is_the_joint_confidence_region(
         estimate=fit.estimate[:2],
         covariance=fit.covariance[:2, :2],
         limits=fit.limits[:2],
-        known_noise=known,
+        interval_freedom=freedom,
     )
     (axes,) = draw_fit(pair)["confidence"].axes
     units = [size for _, size in pair.display_units.values()]
     points = axes.patches[0].get_xy() * units - pair.estimate
     square = np.einsum("ij,jk,ik->i", points, np.linalg.inv(pair.covariance), points)
     # The region of one parameter with the same freedom is the interval: F with 1 is t squared.
-    freedom = freedom if known else pair.degrees_of_freedom
     quantile = 2 * stats.f.ppf(0.95, 2, freedom) if freedom else stats.chi2.ppf(0.95, 2)
     np.testing.assert_allclose(square, quantile, rtol=1e-6)

@@ -102,7 +102,7 @@ def test_record_whose_last_millisecond_is_below_a_tenth_is_whole(
     assert (last < 0.1) == whole
     target = thud.ForceTarget((time, force), noise=1.0)
     if whole:
-        assert target.misfit().time[-1] == pytest.approx(time[-1])
+        assert target.compare().record.time[-1] == pytest.approx(time[-1])
     else:
         with pytest.raises(thud.InputError, match=naming("target", "force", f"{last:.0%}")):
-            target.misfit()
+            target.compare()

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import re
 import sys
-from collections import Counter
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import codes, naming, quiet_fit
+from conftest import naming, quiet_fit
 from scipy import stats
 from scipy.linalg import toeplitz
 
@@ -22,16 +20,18 @@ from thud.recordings.background import (
     fit_noise,
     unit_covariances,
 )
-from thud.studies.fitting import force_misfit, inference, record_noise, search
-from thud.studies.fitting.inference import UNLIKELY, residual_warnings
+from thud.studies.fitting import record_noise, residual_tests
 from thud.studies.fitting.record_noise import (
-    BackgroundRecord,
+    Quiet,
     Weights,
     cell_waves,
     find_pulse,
+    find_quiet,
     grid_covariance,
     hum_harmonics,
+    log_likelihood,
     new_weights,
+    strongest_tone,
     to_grid,
     wave_size,
 )
@@ -130,13 +130,19 @@ def test_weights_of_a_record_are_those_of_its_samples(
     mains: bool,  # noqa: FBT001
 ) -> None:
     n, count, rate = 301, 41, 3000.0
-    quiet = BackgroundRecord(np.zeros(n), rate, (120, 170), 400.0)
+    time = (np.arange(n) - 145) / rate
     variances = np.array([3e-3, 0.3, 20.0, 1.0, 2.0])
     background = Background((np.zeros(1), np.ones(1)), np.zeros(1), variances, 900.0)
     found = new_weights(
-        quiet, count, background=background, noise=given, offset=True, tones=[70.0], mains=mains
+        time,
+        rate,
+        count,
+        background=background,
+        noise=given,
+        offset=True,
+        tones=[70.0],
+        mains=mains,
     )
-    time = (np.arange(n) - 145) / rate
     cells = time - 0.5 / rate, time + 0.5 / rate
     pink, brown, fifty, sixty = variances[1:, None, None] * unit_covariances(cells, cells)[:4]
     white = variances[0] * rate / 2 * np.eye(n)
@@ -154,15 +160,15 @@ def test_weights_of_a_record_are_those_of_its_samples(
     np.testing.assert_allclose(one, other, rtol=0, atol=1e-5 * np.abs(other).max())
 
 
-def background_of(seed: int, tone: float = 0.0, size: float = 0.0) -> BackgroundRecord:
-    """Return 0.1 s of white noise on both sides of a pulse, with a tone, Hz and N."""
+def background_of(seed: int, *waves: float, size: float = 0.0) -> Quiet:
+    """Return 0.1 s of white noise on both sides of a pulse, with tones, Hz, of a size, N."""
     n = int(0.24 * RATE)
     time = np.arange(n) / RATE
     force = np.random.default_rng(seed).normal(scale=5, size=n)
-    force += size * np.sin(2 * np.pi * tone * time + seed)
+    force += size * np.sin(2 * np.pi * np.outer(waves, time) + seed).sum(axis=0)
     first, stop = int(0.11 * RATE), int(0.13 * RATE)
     force[first:stop] += 1500 * np.sin(np.pi * np.arange(stop - first) / (stop - first))
-    return BackgroundRecord(force, RATE, (first, stop), 500.0)
+    return find_quiet(force, RATE, (first, stop), 500.0)
 
 
 def test_quiet_counts_up_to_a_tenth_of_a_second() -> None:
@@ -172,12 +178,12 @@ def test_quiet_counts_up_to_a_tenth_of_a_second() -> None:
     assert quiet.freedom == 2 * 500 * 0.2 - 1
     assert quiet.known
     assert quiet.middle == pytest.approx(0.12, abs=1 / RATE)
-    assert quiet.deviation() == pytest.approx(5, rel=4 / np.sqrt(2 * 0.22 * RATE))
-    short = BackgroundRecord(quiet.force, RATE, (int(0.0105 * RATE), len(quiet.force)), 500.0)
+    assert quiet.deviation == pytest.approx(5, rel=4 / np.sqrt(2 * 0.22 * RATE))
+    short = find_quiet(np.ones(500), RATE, (int(0.0105 * RATE), 500), 500.0)
     assert short.freedom == int(2 * 500 * int(0.0105 * RATE) / RATE) - 1
     assert not short.known
     # Cells of a millisecond, one for each independent value of the band, next to the pulse.
-    (begins, ends), mean = quiet._means  # noqa: SLF001
+    (begins, ends), mean = quiet.cells, quiet.mean
     width = int(RATE / 1000)
     assert len(mean) == 2 * (int(0.1 * RATE) // width)
     inner, outer = 0.01, 0.01 + int(0.1 * RATE) // width * width / RATE
@@ -203,7 +209,7 @@ def test_likelihood_of_quiet_is_that_of_normal_cells() -> None:
     other = replace(background, variances=2 * background.variances)
     begins, ends = background.cells
     values = [
-        record_noise._log_likelihood(one)  # noqa: SLF001
+        log_likelihood(one)
         - stats.multivariate_normal.logpdf(
             one.mean,
             cov=one.covariance(one.cells, one.cells)
@@ -218,7 +224,7 @@ def test_noise_that_waves_have_taken_is_given_back() -> None:
     """Waves of t tones take 2 t of n degrees of freedom."""
     quiet = background_of(3)
     plain, tones = quiet.background(), (150.0, 333.0, 470.0, 611.0)
-    cells, mean = quiet._means  # noqa: SLF001
+    cells, mean = quiet.cells, quiet.mean
     waves = cell_waves(cells, tones)
     left = mean - waves @ np.linalg.lstsq(waves, mean)[0]
     fitted = np.exp(fit_noise(cells, left, plain.peak)[0])
@@ -231,57 +237,25 @@ def test_noise_that_waves_have_taken_is_given_back() -> None:
     )
 
 
-def test_hum_of_the_mains_has_its_own_standard_error() -> None:
-    pulls = []
-    for seed in range(6):
-        quiet = background_of(seed, 60.0, 4.0)
-        mains, size, error = quiet.mains(quiet.background())
-        assert mains == 60
-        pulls.append((size - 4) / error)
-        # White noise of 5 N: the variance of an amplitude is 2/n times that of samples.
-        assert error == pytest.approx(5 * np.sqrt(2 / (0.2 * RATE)), rel=0.25)
-    assert np.square(pulls).sum() < stats.chi2.ppf(1 - 1e-3, 6)
-
-
-def test_tones_are_looked_for_at_quarters_of_the_resolution(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    strongest, grids = record_noise._strongest, []  # noqa: SLF001
-
-    def watched(*arguments: Any) -> tuple[float, float]:  # noqa: ANN401
-        grids.append(arguments[-1])
-        return strongest(*arguments)
-
-    monkeypatch.setattr(record_noise, "_strongest", watched)
+def test_tones_are_found_between_those_of_the_mains_and_the_band_edge() -> None:
+    # Three at most; each is found to a tenth of the resolution: 0.1 s on both sides of 20 ms.
     truth = [123.4, 217.3, 333.1, 411.9]
-    quiet = background_of(6)
-    time = np.arange(len(quiet.force)) / RATE
-    waves = np.sin(2 * np.pi * np.outer(truth, time)).sum(axis=0)
-    found = replace(quiet, force=quiet.force + 10 * waves).tones()
-    # 0.1 s on both sides of the 20 ms of the pulse.
-    resolution = 1 / 0.22
-    for grid in grids:
-        assert np.diff(grid).min() == pytest.approx(resolution / 4, rel=0.01)
-        assert grid.min() == 10
-        assert grid.max() == pytest.approx(0.95 * 500, abs=resolution / 4)
-        # Those of the mains are part of the noise.
-        for mains in (50, 60):
-            assert resolution / 2 < np.abs(grid - mains).min() < 0.75 * resolution
-    # Three at most; each is found to a tenth of the resolution.
+    found = background_of(6, *truth, size=10.0).tones()
     assert len(set(found)) == 3
-    assert all(np.abs(np.array(truth) - tone).min() < resolution / 10 for tone in found)
+    assert all(np.abs(np.array(truth) - tone).min() < 0.1 / 0.22 for tone in found)
+    # Hum of the mains is part of the noise; below 10 and above 475 Hz there is none.
+    for tone in (7.0, 60.0, 490.0):
+        assert background_of(6, tone, size=10.0).tones() == ()
 
 
 def test_strongest_tone_has_the_gain_of_its_likelihood() -> None:
-    quiet = background_of(5, 333.0, 3.0)
-    cells, mean = quiet._means  # noqa: SLF001
+    quiet = background_of(5, 333.0, size=3.0)
+    cells, mean = quiet.cells, quiet.mean
     whiten = record_noise._trendless(cells)  # noqa: SLF001
     np.testing.assert_allclose(whiten @ whiten, whiten, atol=1e-12)
     middle = (cells[0] + cells[1]) / 2
     np.testing.assert_allclose(whiten @ (7 + 3 * middle), 0, atol=1e-12)
-    tone, gain = record_noise._strongest(  # noqa: SLF001
-        cells, whiten @ mean, whiten, np.arange(100, 600, 1.0)
-    )
+    tone, gain = strongest_tone(cells, mean, whiten, np.arange(100, 600, 1.0))
     assert tone == pytest.approx(333, abs=1.0)
 
     def left(f: float) -> float:
@@ -296,65 +270,40 @@ def test_strongest_tone_has_the_gain_of_its_likelihood() -> None:
     assert gain == pytest.approx(len(mean) / 2 * np.log(whole / best), rel=1e-3)
 
 
-def test_white_residuals_fail_each_test_as_often_as_it_says(
-    monkeypatch: pytest.MonkeyPatch,
+@pytest.mark.parametrize("test", ["color", "contact", "change", "size", "size of quiet"])
+def test_noise_fails_each_test_as_often_as_it_says(
+    test: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(inference, "UNLIKELY", 0.1)
-    rng, time = np.random.default_rng(7), np.arange(101) * 4e-4
-    told = Counter(
-        note.code for _ in range(500) for note in residual_warnings(rng.normal(size=101), time)
-    )
-    # The bound of Bonferroni is not reached by 1 - 0.1/2, and runs are whole numbers.
-    low, high = stats.binom.ppf([1e-4, 1 - 1e-4], 500, [0.085, 0.115])
-    for code in ("residuals_colored", "residual_large", "residuals_dependent"):
-        assert low <= told[code] <= high
-
-
-def test_runs_are_those_of_wald_and_wolfowitz() -> None:
-    n, m = 140, 90
-    mean = 1 + 2 * n * m / (n + m)
-    deviation = np.sqrt((mean - 1) * (mean - 2) / (n + m - 1))
-    for runs in range(40, 170):
-        # As many runs of either sign, ones but for the last.
-        positive, negative = (runs + 1) // 2, runs // 2
-        lengths = np.ones(runs, dtype=int)
-        lengths[(positive - 1) * 2] += n - positive
-        lengths[(negative - 1) * 2 + 1] += m - negative
-        signs = np.repeat(np.where(np.arange(runs) % 2, -1.0, 1.0), lengths)
-        told = inference.runs_warning(signs)
-        assert bool(told) == (2 * stats.norm.sf(abs(runs - mean) / deviation) <= UNLIKELY)
-        if told:
-            assert (told[0].value, told[0].others["expected"]) == (runs - 1, mean - 1)
-
-
-@pytest.mark.parametrize("place", ["contact", "change", "size", "size of quiet"])
-def test_noise_is_doubted_as_often_as_the_tests_say(
-    place: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for module in (force_misfit, search):
-        monkeypatch.setattr(module, "UNLIKELY", 0.1)
-    rng, told, tries = np.random.default_rng(9), 0, 800
+    monkeypatch.setattr(residual_tests, "UNLIKELY", 0.1)
+    rng, warned, tries = np.random.default_rng(9), 0, 800
     inside = np.arange(40) >= 28
     for _ in range(tries):
         values = rng.normal(size=40)
-        if place == "contact":
+        if test == "color":
+            notes = residual_tests.color_warning(rng.normal(size=101))
+        elif test == "contact":
             # Three parameters take three of the twelve during contact.
             basis, _ = np.linalg.qr(rng.normal(size=(12, 3)))
             values[inside] -= basis @ (basis.T @ values[inside])
-            found = force_misfit._contact_warning(values, inside, 3, 2.0)  # noqa: SLF001
-        elif place == "change":
-            found = force_misfit._change_warning(values, ~inside, inside)  # noqa: SLF001
+            notes = residual_tests.contact_warning(values, inside, 3, 2.0)
+        elif test == "change":
+            notes = residual_tests.change_warning(values, ~inside, inside)
         else:
-            freedom = 25 if place == "size of quiet" else None
-            misfit = SimpleNamespace(known_noise=True, noise_freedom=freedom, size=40, absorbed=0)
+            freedom = 25 if test == "size of quiet" else None
             scale = np.sqrt(rng.chisquare(25) / 25) if freedom else 1.0
-            fit = SimpleNamespace(
-                targets=[SimpleNamespace(misfit=misfit)], names=(), residuals=values / scale
-            )
-            found = not np.isnan(search.size_of_residuals(fit))  # type: ignore[arg-type]
-        told += bool(found)
-    low, high = stats.binom.ppf([1e-4, 1 - 1e-4], tries, 0.1)
-    assert low <= told <= high
+            notes = residual_tests.size_warning(values / scale, 40, freedom)
+        warned += bool(notes)
+    low, high = stats.binom.ppf([1e-4, 1 - 1e-4], tries, [0.085, 0.115])
+    assert low <= warned <= high
+
+
+def test_color_is_that_of_residuals_but_a_constant() -> None:
+    white = np.random.default_rng(1).normal(size=251)
+    slow = np.convolve(white, [1.0, 1.0], "same") / np.sqrt(2)
+    (note,) = residual_tests.color_warning(slow)
+    assert (note.code, note.others["side"]) == ("residuals_colored", "low")
+    assert not residual_tests.color_warning(slow[:19])
+    assert not residual_tests.color_warning(white + 3)
 
 
 def test_white_noise_stays_white_on_the_grid() -> None:
@@ -377,7 +326,6 @@ def test_pulse_is_found_on_an_offset() -> None:
     ("disturbance", "name", "size"),
     [
         ("offset of 20 N", "offset", 20.0),
-        ("hum of 60 Hz, 3 N", "hum of 60 Hz", 3.0),
         # Its frequency is found to 0.2 Hz.
         ("hum of 16.7 Hz, 10 N", "hum of 16.", 10.0),
     ],
@@ -388,13 +336,20 @@ def test_what_lies_under_the_pulse_is_found(disturbance: str, name: str, size: f
     assert (np.abs(pulls(fit)) < FAR).all()
     nuisances = fit.targets[0].nuisances
     name = next(one for one in nuisances if one.startswith(name))
-    # A tone of 16.7 Hz is not hum of 50 Hz too.
     assert set(nuisances) == {"offset", name}
     value, error = nuisances[name]
     assert abs(value - size) < FAR * error
     # That of an offset holds the unknown constant of colored noise.
     assert error < 0.15 * size
     assert f"{name} {value:.3g} ± {error:.2g} N" in str(fit)
+
+
+def test_hum_of_the_mains_is_noted() -> None:
+    fit = thud.fit(record("hum of 60 Hz, 3 N"), TRUTH, CASE)
+    (note,) = (note for note in fit.notes if note.code == "hum_removed")
+    assert note.others["frequency"] == 60
+    # White noise of 5 N: the variance of an amplitude is 2/n times that of samples.
+    assert note.value == pytest.approx(3.0, abs=4 * 5 * np.sqrt(2 / (2 * QUIET * RATE)))
 
 
 def test_offset_of_a_record_without_noise_is_no_misfit() -> None:
@@ -420,11 +375,7 @@ def test_noise_makes_no_tone() -> None:
     # A tone would be found in fewer than one record in a thousand.
     for seed in range(3):
         for colour in ("white noise", "pink noise", "brown noise"):
-            misfit = thud.ForceTarget(record(colour, seed)).misfit()
-            assert misfit.tones == ()
-            # The error of hum counts the color of the noise.
-            _, size, error = misfit.background_record.mains(misfit.background)
-            assert size < 4.5 * error
+            assert thud.ForceTarget(record(colour, seed)).compare().tones == ()
 
 
 def test_standard_errors_grow_with_slow_noise() -> None:
@@ -459,7 +410,7 @@ def test_gain_is_found_or_known_to_an_extent() -> None:
     ("disturbance", "words"),
     [
         ("blue noise", "colored"),
-        ("spike", r"residual.* 86\.6"),
+        ("spike", "colored"),
         ("ringing of 300 Hz", "uncertainty|model"),
         ("louder behind first touch", "contact"),
     ],
@@ -478,27 +429,6 @@ def test_too_little_quiet_warns_unless_the_offset_is_decided() -> None:
     assert not fit.targets[0].nuisances
     decided = thud.fit(thud.ForceTarget(short, offset=True), TRUTH, CASE)
     assert set(decided.targets[0].nuisances) == {"offset"}
-
-
-def test_white_residuals_pass_and_others_do_not() -> None:
-    random = np.random.default_rng(1)
-    time = np.arange(251) * 4e-4
-    told = sum(len(residual_warnings(random.normal(size=251), time)) for _ in range(300))
-    # Three tests of 300 sequences; more would have a probability of 1e-4.
-    assert told <= stats.binom.ppf(1 - 1e-4, 900, UNLIKELY)
-    white = random.normal(size=251)
-    slow = np.convolve(white, [1.0, 1.0], "same") / np.sqrt(2)
-    spiked = np.where(np.arange(251) == 100, 6.0, white)
-    first, second = residual_warnings(slow, time)
-    assert (first.code, first.others["side"]) == ("residuals_colored", "low")
-    assert second.code == "residuals_dependent"
-    (told_spike,) = residual_warnings(spiked, time)
-    assert (told_spike.code, told_spike.others["position"]) == ("residual_large", 40.0)
-    assert told_spike.value == 6.0
-    assert "residuals_one_sign" in codes(residual_warnings(np.abs(white), time))
-    assert not residual_warnings(slow[:10], time[:10])
-    # A constant is no frequency: it is told by its runs alone.
-    assert "residuals_colored" not in codes(residual_warnings(white + 3, time))
 
 
 @pytest.mark.parametrize(

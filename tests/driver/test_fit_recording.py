@@ -15,7 +15,7 @@ from thud.recordings.config import Config
 from thud.recordings.read_recording import measure_stages, read_recording
 from thud.recordings.recording import Recording
 from thud.recordings.signal import Signal
-from thud.studies.fit import KIND
+from thud.studies.fit import read_fit_study, run_fit
 from thud.studies.fitting.force_target import ForceTarget
 
 if TYPE_CHECKING:
@@ -107,10 +107,10 @@ def test_residuals_tell_the_law_of_the_loss(tmp_path: Path) -> None:
 
 
 def test_noise_is_that_of_the_quiet(record: tuple[Recording, float]) -> None:
-    misfit = ForceTarget(record[0]).misfit()
+    comparison = ForceTarget(record[0]).compare()
     # 0.2 s of quiet hold 500 values below 1.25 kHz; the background takes some of them.
-    assert misfit.unit_deviation == pytest.approx(record[1], rel=FAR / np.sqrt(2 * 450))
-    assert ForceTarget(record[0], noise=3.0).misfit().unit_deviation == 3.0
+    assert comparison.unit_deviation == pytest.approx(record[1], rel=FAR / np.sqrt(2 * 450))
+    assert ForceTarget(record[0], noise=3.0).compare().unit_deviation == 3.0
 
 
 def test_noise_above_the_band_does_not_count(record: tuple[Recording, float]) -> None:
@@ -121,9 +121,9 @@ def test_noise_above_the_band_does_not_count(record: tuple[Recording, float]) ->
     target = ForceTarget(replace(record[0], drops=(with_force(drop, drop.force + blue),)))
     frequency = np.linspace(0, target.below, 1000)
     density = (2 * np.sin(np.pi * frequency / drop.sample_rate)) ** 2
-    quiet = ForceTarget(record[0]).misfit().unit_deviation
+    quiet = ForceTarget(record[0]).compare().unit_deviation
     expected = np.hypot(quiet, 5.0 * np.sqrt(density.mean()))
-    assert target.misfit().unit_deviation == pytest.approx(expected, rel=FAR / np.sqrt(2 * 450))
+    assert target.compare().unit_deviation == pytest.approx(expected, rel=FAR / np.sqrt(2 * 450))
     assert np.hypot(quiet, 5.0 * np.sqrt(2)) > 1.5 * expected
 
 
@@ -143,7 +143,7 @@ def test_too_little_quiet_leaves_the_noise_to_the_residuals(shell: thud.Impact) 
     force, _ = make_recording(
         pulse(shell), shell.sample_rate, before=0.006, after=0.006, noise_db=NOISE_DB
     )
-    assert not ForceTarget(_measured(force, shell.sample_rate)).misfit().known_noise
+    assert not ForceTarget(_measured(force, shell.sample_rate)).compare().known_noise
 
 
 def _measured(force: np.ndarray, rate: float) -> Recording:
@@ -168,7 +168,7 @@ def two(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def run(folder: Path, more: str = "") -> thud.Fit:
     """Run the study of the recording."""
     (folder / "study.toml").write_text(STUDY.format(more=more))
-    return KIND.run(thud.read_study("study.toml", "fit"))
+    return run_fit(read_fit_study("study.toml"))
 
 
 @pytest.mark.parametrize(("more", "truth"), [("", 1.6e6), ("drop = 2", 1.8e6)])
@@ -186,7 +186,7 @@ def test_table_is_measured_where_a_drop_is_chosen(two: Path) -> None:
     )
     text = STUDY.format(more="drop = 2").replace("record.wav", "record.csv")
     (two / "study.toml").write_text(text)
-    found = KIND.run(thud.read_study("study.toml", "fit"))
+    found = run_fit(read_fit_study("study.toml"))
     assert found.values["youngs_modulus"] == pytest.approx(1.8e6, rel=1e-3)
 
 
@@ -218,14 +218,14 @@ def test_recording_that_is_missing_or_none_gets_one_sentence(two: Path) -> None:
 
 def test_arrays_have_one_drop(shell: thud.Impact) -> None:
     with pytest.raises(thud.InputError, match=naming("target", "drop", 2)):
-        ForceTarget((shell.time, shell.floor_force), drop=2).misfit()
+        ForceTarget((shell.time, shell.floor_force), drop=2).compare()
 
 
 @pytest.mark.parametrize("name", ["fit_recording", "fit_recording_constant_loss"])
 def test_studies_of_the_repository_can_be_read(name: str) -> None:
-    study = thud.read_study(REPOSITORY / f"inputs/studies/{name}.toml", "fit")
-    ((_, misfit),) = study.pairs()
+    study = read_fit_study(REPOSITORY / f"inputs/studies/{name}.toml")
+    (term,) = study.terms
     # make_recording.py: 5 N of noise, 0.2 s of quiet.
-    assert misfit.unit_deviation == pytest.approx(5.0, rel=FAR / np.sqrt(2 * 450))
+    assert term.comparison.unit_deviation == pytest.approx(5.0, rel=FAR / np.sqrt(2 * 450))
     viscosity = "constant_loss" if "constant" in name else "kelvin_voigt"
     assert study.case.model.viscosity == viscosity

@@ -13,7 +13,7 @@ from conftest import REPOSITORY, names_in, naming
 
 import thud
 from thud import cli
-from thud.studies.fit import KIND
+from thud.studies.fit import read_fit_study, run_fit
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -72,9 +72,9 @@ def test_studies_of_the_repository(
 
 
 def test_units_are_those_of_the_file() -> None:
-    study = thud.read_study("study.toml", "fit")
+    study = read_fit_study("study.toml")
     assert [p.table for p in study.parameters] == [{"start": 1.4e6, "unit": "MPa"}]
-    fit = KIND.run(study)
+    fit = run_fit(study)
     # The table of the record has times of its own.
     assert fit.time_shift == pytest.approx(0.2, abs=1e-6)
     assert fit.values["youngs_modulus"] == pytest.approx(1.56e6, rel=1e-6)
@@ -86,7 +86,7 @@ def test_values_are_those_of_the_file_to_the_last_bit(tmp_path: Path) -> None:
         '[target]\nfile = "record.csv"\n[parameters]\nwall_thickness = { start = 36, unit = "mm" }'
     )
     (tmp_path / "study.toml").write_text(text)
-    (parameter,) = thud.read_study("study.toml", "fit").parameters
+    (parameter,) = read_fit_study("study.toml").parameters
     assert parameter.start == 0.036
 
 
@@ -114,17 +114,26 @@ def test_window_without_an_end_is_saved(tmp_path: Path) -> None:
     assert saved["study"]["target"]["window"] == [0, "Infinity"]
 
 
-def test_results_of_another_fit_are_not_touched(tmp_path: Path, errors_of: ErrorsOf) -> None:
-    assert cli.main(FIT) == 0
-    assert cli.main(FIT) == 0
+def test_results_are_replaced_as_a_whole_and_others_on_demand_only(
+    tmp_path: Path, errors_of: ErrorsOf
+) -> None:
+    both = ["fit", "-q", "study.toml", "-o", "found"]
+    (tmp_path / "study.toml").write_text(f"{STUDY}height = {{}}\n")
+    assert cli.main(both) == 0
+    assert (tmp_path / "found/confidence.svg").exists()
+    # The same study with one parameter has no regions.
+    (tmp_path / "study.toml").write_text(STUDY.replace("[target]", "[target]\ntime_shift = false"))
+    np.savetxt("record.csv", np.loadtxt("record.csv", delimiter=",") - [0.2, 0], delimiter=",")
+    assert cli.main(both) == 0
+    assert names_in(tmp_path / "found") == [
+        "fit.csv", "fit.json", "fit.svg", "fitted.nml", "thud.txt",
+    ]  # fmt: skip
     before = (tmp_path / "found/fit.json").read_bytes()
-    (tmp_path / "study.toml").write_text(STUDY.replace("1.4", "1.5"))
-    error = errors_of(*FIT)
-    words = naming("found/fit.json", "[parameters] youngs_modulus", 1.4, 1.5, "--replace")
-    assert re.search(words, error)
+    (tmp_path / "other.toml").write_text(STUDY)
+    other = ["fit", "-q", "other.toml", "-o", "found"]
+    assert re.search(naming("found", "--replace"), errors_of(*other))
     assert (tmp_path / "found/fit.json").read_bytes() == before
-    (tmp_path / "found/fit.json").write_text("[]")
-    assert cli.main(FIT) == 1
+    assert cli.main([*other, "--replace"]) == 0
 
 
 @pytest.mark.parametrize("place", ["study.toml", "/proc"])
@@ -136,13 +145,12 @@ def test_useless_directory_is_reported_before_the_search(
 
 
 def test_fit_that_cannot_be_saved_is_refused_before_it_is_made(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, errors_of: ErrorsOf, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "found/fit.csv").mkdir(parents=True)
-    assert cli.main(["fit", "-o", "found", "study.toml"]) == 1
-    captured = capsys.readouterr()
-    assert not captured.out
-    assert "found/fit.csv" in captured.err
+    monkeypatch.delattr("thud.studies.fit.search")
+    (tmp_path / "found").mkdir()
+    (tmp_path / "found/notes.txt").touch()
+    assert "found" in errors_of("fit", "-q", "-o", "found", "study.toml")
 
 
 @pytest.mark.parametrize(
@@ -231,38 +239,6 @@ def test_targets_are_those_of_their_script(
     assert first in (STUDIES / "fit_levels.toml").read_text()
 
 
-def test_results_of_another_record_or_case_are_not_touched(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    record = np.loadtxt("record.csv", delimiter=",")
-    (tmp_path / "study.toml").write_text('case = "ball.nml"\n' + STUDY)
-    for mass, scale in ((2.5, 1), (2.4, 1), (2.5, 0.9)):
-        (tmp_path / "ball.nml").write_text(f"&ball mass = {mass} / &drop / &model /\n")
-        np.savetxt("record.csv", record * [1, scale], delimiter=",")
-        if (mass, scale) == (2.5, 1):
-            assert cli.main(FIT) == 0
-            before = (tmp_path / "found/fit.json").read_bytes()
-            continue
-        assert cli.main(FIT) == 1
-        words = naming("&ball: mass", 2.5, 2.4) if mass == 2.4 else naming("numbers", "[target]")
-        assert re.search(words, capsys.readouterr().err)
-        assert (tmp_path / "found/fit.json").read_bytes() == before
-
-
-def test_replace_finds_the_fit_again_and_leaves_no_older_file(tmp_path: Path) -> None:
-    both = STUDY + "height = {}\n"
-    (tmp_path / "study.toml").write_text(both)
-    fit = ["fit", "-q", "study.toml", "-o", "found"]
-    assert cli.main(fit) == 0
-    assert (tmp_path / "found/confidence.svg").exists()
-    (tmp_path / "study.toml").write_text(STUDY.replace("[target]", "[target]\ntime_shift = false"))
-    np.savetxt("record.csv", np.loadtxt("record.csv", delimiter=",") - [0.2, 0], delimiter=",")
-    assert cli.main([*fit, "--replace"]) == 0
-    assert names_in(tmp_path / "found") == [
-        "fit.csv", "fit.json", "fit.svg", "fitted.nml",
-    ]  # fmt: skip
-
-
 def test_fixed_keys_and_units_of_targets(tmp_path: Path) -> None:
     plain = STUDY.replace("[target]", "[target]\nnoise = 5\nbelow = 1000\nwindow = [0.2, 0.23]")
     units = """
@@ -278,12 +254,12 @@ youngs_modulus = { start = 1400, unit = "kPa" }
     (tmp_path / "ball.nml").write_text("&ball mass = 2.4 / &drop / &model /\n")
     (tmp_path / "plain.toml").write_text(f'case = "ball.nml"\n{plain}')
     (tmp_path / "units.toml").write_text(units)
-    one, other = (KIND.run(f"{name}.toml") for name in ("plain", "units"))
+    one, other = (run_fit(f"{name}.toml") for name in ("plain", "units"))
     assert other.case.ball.mass == 2.4
     assert one.values == other.values
     density = {"density": {"value": 1.0, "unit": "g/cm3"}}
     study = {"fixed": density, "target": {"levels": [39, 31, 23, 17, 12]}}
-    found = thud.read_study({**study, "parameters": {"youngs_modulus": {}}}, "fit")
+    found = read_fit_study({**study, "parameters": {"youngs_modulus": {}}})
     assert found.case.ball.mass == pytest.approx(1e3 * 4 / 3 * np.pi * (0.089**3 - 0.057**3))
     with pytest.raises(thud.InputError, match=naming("density", "geometry")):
-        thud.read_study({**study, "parameters": {"wall_thickness": {}}}, "fit")
+        read_fit_study({**study, "parameters": {"wall_thickness": {}}})

@@ -87,7 +87,7 @@ WRITERS = {
 # They write no results, but `examples` a directory of its own and `assess` a table as others do.
 OTHERS = {"explore", "calibrate", "examples", "assess"}
 # Their directories grow: they replace files by their names.
-STUDIES = {"sweep", "sensitivity", "design", "uncertainty", "fit"}
+STUDIES = {"sweep", "sensitivity", "design", "uncertainty"}
 
 
 def test_no_command_escapes() -> None:

@@ -46,7 +46,7 @@ assert "mid_peak" in learned.outputs, learned.outputs
 target = thud.LevelTarget(
     impact.levels(), 0.2, quantities={"mid_peak": (impact.mid_peak, 1.0)}
 )
-assert target.misfit().size == 6
+assert target.compare().size == 6
 recording = thud.read_recording(sys.argv[1], mass=2.5, height=1.0)
 assert abs(recording.quantity("mid_peak") / recording.peak_force - 0.5) < 0.4
 thud.write_report(recording, "report")

@@ -14,6 +14,7 @@ from mutate_recordings import mutated_text
 from sentences import INNER, fault_of
 
 import thud
+from thud.studies.fit import FitStudy, read_fit_study, run_fit
 from thud.studies.kinds import KINDS, get_kind
 
 if TYPE_CHECKING:
@@ -60,18 +61,21 @@ def attempt(chance: random.Random) -> tuple[str, str]:
     path = Path("study.toml")
     path.write_bytes(text.encode(errors="surrogateescape"))
     try:
-        study = thud.read_study(path, kind)  # type: ignore[arg-type]
+        study = read_fit_study(path) if kind == "fit" else thud.read_study(path, kind)
     except thud.ThudError as error:
         path.unlink()
         wrong = fault_of(error, "study.toml", text + "nowhere")
         return ("raw", f"{wrong}: {kind}: {text!r}") if wrong else ("refused", "")
     path.unlink(missing_ok=True)
-    if study.model not in QUICK or chance.random() > COMPUTED or not _is_small(study):
+    if study.case.model.name not in QUICK or chance.random() > COMPUTED or not _is_small(study):
         return "accepted", ""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            table = get_kind(kind).run(study, allow_large=True, workers=1).table()
+            if isinstance(study, FitStudy):
+                table = run_fit(study).table()
+            else:
+                table = get_kind(kind).run(study, allow_large=True, workers=1).table()
     except thud.ThudError as error:
         inner = INNER.search(str(error))
         return ("raw", f"{error}: {text!r}") if inner or "\n" in str(error) else ("failed", "")
@@ -80,11 +84,12 @@ def attempt(chance: random.Random) -> tuple[str, str]:
     return "computed", ""
 
 
-def _is_small(study: thud.Study) -> bool:
+def _is_small(study: thud.Study | FitStudy) -> bool:
     size = 1
     for parameter in study.parameters:
         size *= max(1, parameter.size)
-    given = json.loads(study.text) if study.text.startswith("{") else {}
+    text = getattr(study, "text", "")
+    given = json.loads(text) if text.startswith("{") else {}
     return size <= MOST and len(study.parameters) <= 3 and not given
 
 

@@ -6,6 +6,11 @@ LIBRARY = "{name} {text}"
 
 # What was done with a signal.
 PROCESSING = {
+    # Fits.
+    "unknowns_included": "unknown, in the intervals: {unknowns}; noise alone: {errors}",
+    "press_included": "unknown, in the intervals as far as the curve does not show it: {unknowns}",
+    "not_visible": "not in the intervals, and not visible: {cause} changes {changes}",
+    "widened": "intervals widened {value:.3g} times, see the warnings",
     # Reading of files.
     "sign_stated": "the sign was changed: polarity = '{polarity}'",
     "sign_changed": "the sign was changed: the largest peak, {value:.4g} {unit}, is negative",
@@ -188,9 +193,6 @@ WARNINGS = {
     "hardly_identifiable": "{names} are hardly identifiable: along {changes} the {confidence:.0%} "
     "interval is +-{value:.0f} {unit}{product}",
     "inseparable": "{first} and {second} cannot be separated: correlation {shown}",
-    "hardly_separable": "{first} and {second} can hardly be separated: correlation {shown}",
-    "weakest_combination": "weakest parameter combination: {changes}, standard error {value:.2g} "
-    "{unit}, {ratio:.3g} times that of the strongest",
     "at_limit": "{name} ended at its limit, {limit}: its interval is cut there, and all intervals "
     "hold inside the limits only",
     "alternative_seen": "the residuals contain the effect of {alternative} ({value:.3g} standard "
@@ -201,11 +203,6 @@ WARNINGS = {
     "the model does not explain the data",
     "residuals_colored": "the residuals are colored: half of their power lies in the {side}est "
     "{value:.0%} of the compared frequencies: the noise is not as assumed or the model is wrong",
-    "residual_large": "the largest residual, at {position:.4g} {unit}, is {value:.3g} standard "
-    "deviations: it is not noise",
-    "residuals_one_sign": "all {value:.0f} residuals have the same sign: they are not independent",
-    "residuals_dependent": "the residuals change their sign {value:.0f} times where {expected:.0f} "
-    "are expected: they are not independent",
     "residuals_in_contact": "the residual is {value:.3g} {unit} during the contact and {high:.3g} "
     "{unit} otherwise: the model differs from the force by more than the noise",
     "residuals_change": "the residuals are {value:.3g} times as large after the contact as before "

@@ -22,6 +22,7 @@ from thud.cli.command import (
     print_immediately,
 )
 from thud.cli.explore_command import EXPLORE
+from thud.cli.fit_command import FIT
 from thud.cli.floor_commands import FLOOR, LISTEN, MOBILITY, PREDICT, RATE
 from thud.cli.recording_commands import CALIBRATE, HISTORY, MEASURE
 from thud.cli.screen import is_terminal, print_error
@@ -52,6 +53,7 @@ COMMANDS = {
     "mobility": MOBILITY,
     **study_commands(),
     "surrogate": SURROGATE,
+    "fit": FIT,
     "examples": EXAMPLES,
 }
 

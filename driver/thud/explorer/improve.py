@@ -13,7 +13,6 @@ import numpy as np
 from thud.base._schema import LIMITS, MET_FROM, VERDICTS, FiniteElement
 from thud.base.checks import refuse
 from thud.base.errors import ThudError
-from thud.base.note import Note
 from thud.base.units import scaled
 from thud.case.constructions import constructions
 from thud.case.keys import find_key, limits, value_in, with_values
@@ -28,7 +27,6 @@ from thud.impact.compute import compute
 from thud.impact.ensemble import solve_many
 from thud.studies.fit import fit
 from thud.studies.fitting.force_target import ForceTarget
-from thud.studies.fitting.search import size_of_residuals
 
 if TYPE_CHECKING:
     from collections.abc import Generator, Mapping, Sequence
@@ -393,13 +391,13 @@ def fit_recording(
 
 def _misfit_text(result: Fit) -> str:
     """Return the end of a sentence on a fit: the largest residual, if it is more than the noise."""
-    size = size_of_residuals(result)
-    if math.isnan(size):
+    unexplained = next((note for note in result.warnings if note.code == "unexplained"), None)
+    if unexplained is None:
         return "."
     columns = {name: np.asarray(values) for name, values in result.targets[0].columns().items()}
     residual = np.abs(columns["residual_N"])
     percent = 100 * residual.max() / columns["target_N"].max()
     return (
-        f", but {Note('unexplained', value=size)}; the largest residual is {residual.max():.0f} N, "
+        f", but {unexplained}; the largest residual is {residual.max():.0f} N, "
         f"{percent:.2g} % of the peak."
     )

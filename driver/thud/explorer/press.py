@@ -97,7 +97,7 @@ def fit_press(paths: Sequence[str], units: Mapping[str, str], values: Values) ->
         note,
         f"a curve determines the modulus only: radius {radius} and wall {wall} are as stated",
         "a press measures slowly: in an impact rubber is stiffer",
-        *result.assumptions,
+        *map(str, result.assumptions),
     ]
     return {
         "values": values,

@@ -22,7 +22,8 @@ from thud.plot.style import (
     own_style,
     tolerance_boxes,
 )
-from thud.studies.fitting.misfit import SHIFT
+from thud.studies.fitting.fit_report import file_ends
+from thud.studies.fitting.force_target import SHIFT, ForceComparison
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,8 +31,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.studies.fitting.fit_result import Fit, FittedTarget
-    from thud.studies.fitting.force_misfit import ForceMisfit
-    from thud.studies.fitting.level_target import LevelMisfit
+    from thud.studies.fitting.level_target import LevelComparison
 
 
 # Maximum number of bands whose names are not rotated.
@@ -48,7 +48,8 @@ BEFORE, AFTER = 0.15, 0.4
 def draw_fit(fit: Fit) -> dict[str, Figure]:
     """Draw ``"fit"``, or ``"fit_1"`` and so on, and for several parameters ``"confidence"``."""
     figures = {
-        f"fit{end}": target_and_fit(fit, number) for number, end in enumerate(fit.ends, start=1)
+        f"fit{end}": target_and_fit(fit, number)
+        for number, end in enumerate(file_ends(len(fit.targets)), start=1)
     }
     if len(fit.names) > 1:
         figures["confidence"] = confidence(fit)
@@ -63,7 +64,7 @@ def target_and_fit(fit: Fit, number: int = 1) -> Figure:
     figure = new_figure(3.6)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[2.2, 1])
     below.axhline(0, color="0.45", linewidth=0.8)
-    if target.misfit.deviation_unit == "N":
+    if isinstance(target.comparison, ForceComparison):
         _draw_force(target, deviation, above, below)
     else:
         _draw_levels(target, deviation, above, below)
@@ -73,11 +74,11 @@ def target_and_fit(fit: Fit, number: int = 1) -> Figure:
 
 def _draw_force(fitted: FittedTarget, deviation: float, above: Axes, below: Axes) -> None:
     """Draw record, fit with its background, and residual."""
-    misfit = cast("ForceMisfit", fitted.misfit)
-    column = misfit.columns(fitted.impact, fitted.own)
+    comparison = cast("ForceComparison", fitted.comparison)
+    column = comparison.columns(fitted.impact, fitted.own)
     time = 1e3 * column["time_s"]
     record, target = column["record_N"], column["target_N"]
-    band = f"below {misfit.below / 1e3:.3g} kHz"
+    band = f"below {comparison.below / 1e3:.3g} kHz"
     if np.median(np.abs(record - target)) > MIN_DIFFERENCE * target.max():
         above.plot(time, record / 1e3, color="0.6", linewidth=0.5, label="Record")
     above.plot(
@@ -85,14 +86,16 @@ def _draw_force(fitted: FittedTarget, deviation: float, above: Axes, below: Axes
     )
     fit = column["model_N"] + column["background_N"]
     above.plot(time, fit / 1e3, color=COLORS[1], linestyle="--", linewidth=1.1, label="Fit")
-    width = 2 * misfit.band_fraction * deviation
+    width = 2 * comparison.band_fraction * deviation
     below.axhspan(-width, width, color=GRAY, linewidth=0)
     below.plot(time, column["residual_N"], color=COLORS[6], linewidth=0.7)
-    contact, touch = fitted.impact.contact_time, fitted.own_value(SHIFT, 0.0)
+    contact, touch = fitted.impact.contact_time, comparison.own_value(SHIFT, fitted.own)
     begin, end = touch - BEFORE * contact, touch + (1 + AFTER) * contact
-    below.set_xlim(1e3 * max(begin, misfit.time[0]), 1e3 * min(end, misfit.time[-1]))
+    below.set_xlim(
+        1e3 * max(begin, comparison.record.time[0]), 1e3 * min(end, comparison.record.time[-1])
+    )
     below.set_xlabel("Time, ms")
-    above.set_ylabel(f"{FORCE_NAMES[misfit.kind].capitalize()}, kN")
+    above.set_ylabel(f"{FORCE_NAMES[comparison.kind].capitalize()}, kN")
     below.set_ylabel("Fit − target, N")
     limit = 1.1 * max(np.abs(column["residual_N"]).max(), width)
     below.set_ylim(-limit, limit)
@@ -103,9 +106,9 @@ def _draw_force(fitted: FittedTarget, deviation: float, above: Axes, below: Axes
 
 def _draw_levels(fitted: FittedTarget, scale: float, above: Axes, below: Axes) -> None:
     """Draw levels with their uncertainty times a scale, and the residuals of all quantities."""
-    misfit = cast("LevelMisfit", fitted.misfit)
-    column = misfit.columns(fitted.impact, fitted.own)
-    residuals = misfit.residual(fitted.impact, fitted.own) / scale
+    comparison = cast("LevelComparison", fitted.comparison)
+    column = comparison.columns(fitted.impact, fitted.own)
+    residuals = comparison.residual(fitted.impact, fitted.own) / scale
     names = [str(name).removesuffix(" Hz") for name in column["quantity"]]
     x = np.arange(len(names))
     count = sum(str(name).endswith(" Hz") for name in column["quantity"])
@@ -126,8 +129,8 @@ def _draw_levels(fitted: FittedTarget, scale: float, above: Axes, below: Axes) -
     below.set_xlim(-0.6, len(names) - 0.4)
     if count > MAX_UPRIGHT:
         below.tick_params(axis="x", labelrotation=90)
-    below.set_xlabel(f"{BAND_NAMES[misfit.bands]}, Hz")
-    above.set_ylabel(level_label(FORCE_NAMES[fitted.impact.assessed_force(misfit.kind)]))
+    below.set_xlabel(f"{BAND_NAMES[comparison.bands]}, Hz")
+    above.set_ylabel(level_label(FORCE_NAMES[fitted.impact.assessed_force(comparison.force)]))
     below.set_ylabel("(Fit − target)\n/ uncertainty")
     legend_above(above)
 

@@ -13,26 +13,20 @@ from scipy.optimize import least_squares
 from thud.base._schema import Ball, Compression
 from thud.base.checks import refuse, refuse_value, require_array, require_number
 from thud.base.errors import FitWarning, NumericalError
-from thud.base.extras import require_extra
 from thud.base.note import Note
 from thud.case.case import Case, new_model
 from thud.case.keys import number_in
 from thud.impact.compression import CompressionCurve, compress
 from thud.studies.fitting.alternatives import PRESS_UNKNOWNS, require_unknowns
 from thud.studies.fitting.estimates import Estimates
-from thud.studies.fitting.inference import (
-    MIN_TESTED,
-    misfit_ratio,
-    require_confidence,
-    residual_warnings,
-    runs_warning,
-)
+from thud.studies.fitting.fit_report import compression_files, compression_table
+from thud.studies.fitting.inference import require_confidence
 from thud.studies.fitting.marginal import Marginal, estimate_marginal
+from thud.studies.fitting.residual_tests import color_warning, misfit_ratio
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    import pandas as pd
     from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
@@ -61,7 +55,7 @@ EXPECTED = 3.3
 _UNITS = {"offset": "N", "drift": "N", "friction": "N", "softening": "", "gain": ""}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class CompressionFit(Estimates):
     """Modulus of elasticity and first touch that fit a measured compression best.
 
@@ -94,29 +88,23 @@ class CompressionFit(Estimates):
         modulus, error = self.values["youngs_modulus"], self.standard_errors["youngs_modulus"]
         return f"<CompressionFit: E {modulus / 1e6:.4g} MPa +- {error / 1e6:.2g} MPa>"
 
-    def to_dataframe(self) -> pd.DataFrame:
-        """Return the measured curve and the force of the model."""
-        with require_extra("studies"):
-            import pandas as pd
-
-        return pd.DataFrame(
-            {
-                "deflection_m": self.deflection,
-                "force_N": self.force,
-                "model_N": self.force + self.residuals - self.effects,
-                "effects_N": self.effects,
-                "residual_N": self.residuals,
-            }
-        )
+    def columns(self) -> dict[str, Array]:
+        """Return the measured curve and the force of the model, m and N."""
+        return {
+            "deflection_m": self.deflection,
+            "force_N": self.force,
+            "model_N": self.force + self.residuals - self.effects,
+            "effects_N": self.effects,
+            "residual_N": self.residuals,
+        }
 
     def table(self) -> str:
         """Return the fit as text."""
-        lines = [
-            f"{name} {value:.2g} ± {error:.2g} {_UNITS[name]}".rstrip()
-            for name, (value, error) in self.nuisances.items()
-        ]
-        noise = f"{len(self.force)} points; noise of {self.noise:.3g} N"
-        return "\n".join([super().table(), "", ", ".join([noise, *lines]), *self.trust])
+        return compression_table(self, _UNITS)
+
+    def files(self) -> dict[str, bytes]:
+        """Return ``fit.json`` and ``fit.csv`` by name."""
+        return compression_files(self)
 
     def plot(self) -> Figure:
         """Draw the measured curve from first touch on, and that of the model."""
@@ -195,7 +183,7 @@ def fit_compression(  # noqa: PLR0913 - as in `compress`
     x, best, converged = _refine(problem, x)
     added = problem.effects(x) @ best.effect
     residual = problem.residual(x) + added
-    notes, ratio = _warnings(best.whiten(residual), measured, x[1])
+    notes, ratio = _warnings(best.whiten(residual), x[1])
     if not converged:
         notes.append(Note("not_converged"))
     for name, value in zip(problem.names, np.abs(best.effect).tolist(), strict=True):
@@ -207,6 +195,7 @@ def fit_compression(  # noqa: PLR0913 - as in `compress`
     scale = np.array([float(np.exp(x[0])) * problem.modulus, problem.span])
     errors = np.sqrt(np.diag(best.effect_covariance))
     nuisances = (problem.sizes * np.array([best.effect, errors])).T.tolist()
+    freedom = len(residual) - _PARAMETERS
     return CompressionFit(
         names=("youngs_modulus", "touch"),
         units=("Pa", "m"),
@@ -216,6 +205,8 @@ def fit_compression(  # noqa: PLR0913 - as in `compress`
         confidence=confidence,
         noise=best.deviation,
         residuals=residual,
+        degrees_of_freedom=freedom,
+        interval_freedom=freedom,
         warnings=tuple(notes),
         assumptions=tuple(problem.assumptions()),
         widened=ratio,
@@ -325,21 +316,17 @@ class _Problem:
         columns = [shapes[name] * size for name, size in zip(self.names, self.sizes, strict=True)]
         return np.column_stack([np.empty((len(depth), 0)), *columns])
 
-    def assumptions(self) -> list[str]:
+    def assumptions(self) -> list[Note]:
         """Return what the intervals include, and what the curve cannot show."""
-        expected = [
+        expected = ", ".join(
             f"{name} ± {size:.2g} {_UNITS[name]}".rstrip()
             for name, size in zip(self.names, self.sizes, strict=True)
-        ]
-        result = [
-            f"unknown, in the intervals as far as the curve does not show it: {', '.join(expected)}"
-        ]
+        )
+        result = [Note("press_included", others={"unknowns": expected})] if expected else []
         if not self.gain:
-            result.append(
-                "not in the intervals, and not visible: calibration 1 % high changes "
-                "youngs_modulus +1 %"
-            )
-        return result if expected else result[1:]
+            others = {"cause": "calibration 1 % high", "changes": "youngs_modulus +1 %"}
+            result.append(Note("not_visible", others=others))
+        return result
 
 
 def _data(deflection: ArrayLike, force: ArrayLike) -> tuple[Array, Array]:
@@ -382,15 +369,10 @@ def _require_gain(gain: object) -> None:
         refuse_value("gain", gain, "0 <= gain < 1")
 
 
-def _warnings(
-    residual: Array, deflection: Array, relative_touch: float
-) -> tuple[list[Note], float]:
+def _warnings(residual: Array, relative_touch: float) -> tuple[list[Note], float]:
     """Return warnings, and by how much residuals of unit variance that are not noise exceed it."""
     result = []
     if min(relative_touch - _BOUNDS[0][1], _BOUNDS[1][1] - relative_touch) < 1e-6:  # noqa: PLR2004 - of the span
         result.append(Note("touch_at_limit"))
-    if len(residual) >= MIN_TESTED:
-        notes = residual_warnings(residual, deflection, "mm")
-    else:
-        notes = runs_warning(residual)
+    notes = color_warning(residual)
     return [*result, *notes], misfit_ratio(residual) if notes else 1.0

@@ -2,42 +2,47 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Unpack
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from thud.base._schema import FiniteElement
 from thud.base.checks import MAX_SEED, refuse, refuse_value, require_kind, require_whole
 from thud.base.errors import FitWarning, InputError, ThudError
-from thud.base.files import read_input
+from thud.base.files import Results
 from thud.case.case import Case, check_case
 from thud.case.keys import with_values
-from thud.studies.directory import FORMATS
+from thud.impact.compute import compute
 from thud.studies.fitting.alternatives import UNKNOWNS, require_unknowns
-from thud.studies.fitting.fit_result import Fit, file_ends
+from thud.studies.fitting.evaluation import search
+from thud.studies.fitting.fit_report import file_ends
 from thud.studies.fitting.force_target import ForceTarget
 from thud.studies.fitting.inference import require_confidence
 from thud.studies.fitting.ranges import bound_parameters, fitted_parameter, get_ranges
 from thud.studies.fitting.read_target import Target, read_target
-from thud.studies.fitting.search import search
-from thud.studies.kind import Kind
-from thud.studies.study import Study, fix_keys, table_of, with_density
+from thud.studies.fitting.search import Term
+from thud.studies.study import (
+    fix_keys,
+    named_files,
+    read_common,
+    read_tables,
+    table_of,
+    with_density,
+)
 
 if TYPE_CHECKING:
+    import os
     from collections.abc import Iterable, Sequence, Set as AbstractSet
-    from pathlib import Path
 
     from numpy.typing import ArrayLike
 
     from thud.impact.impact import Impact
     from thud.recordings.recording import Recording
-    from thud.studies.directory import StudyDirectory
-    from thud.studies.fitting.misfit import Misfit
+    from thud.studies.fitting.fit_result import Fit
     from thud.studies.fitting.ranges import Range
-    from thud.studies.kind import RunOptions
     from thud.studies.parameter import Parameter
 
 # Options of a search, and their defaults.
@@ -46,7 +51,7 @@ OPTIONS: dict[str, Any] = {
     "starts": 1,
     "seed": 0,
     "max_steps": 100,
-    "unknowns": tuple(UNKNOWNS),
+    "unknowns": UNKNOWNS,
 }
 # Maximum number of starts, and of steps of a search.
 _MAXIMUM = 100_000
@@ -61,7 +66,7 @@ def fit(  # noqa: PLR0913 - options of a search
     starts: int = 1,
     seed: int = 0,
     max_steps: int = 100,
-    unknowns: Sequence[str] = tuple(UNKNOWNS),
+    unknowns: Sequence[str] = UNKNOWNS,
     progress: bool = False,
 ) -> Fit:
     """Estimate parameters of a model from a force history or from levels, by least squares.
@@ -124,8 +129,8 @@ def fit(  # noqa: PLR0913 - options of a search
     }
     _require_options(options)
     bound = bound_parameters(case, parameters)
-    pairs = _pairs(case, _targets(target), {parameter.name for parameter in bound})
-    result = _search(pairs, get_ranges(case, bound), options, progress=progress)
+    terms = _terms(case, _targets(target), bound)
+    result = _search(terms, get_ranges(case, bound), options, progress=progress)
     for note in result.warnings:
         warnings.warn(FitWarning(note), stacklevel=3)
     return result
@@ -139,45 +144,54 @@ def _targets(target: Any) -> tuple[Target, ...]:  # noqa: ANN401 - checked here
     return tuple(target)
 
 
-def _pairs(
-    case: Case, targets: Sequence[Target], names: AbstractSet[str]
-) -> list[tuple[Case, Misfit]]:
-    result: list[tuple[Case, Misfit]] = []
+def _terms(case: Case, targets: Sequence[Target], parameters: Sequence[Parameter]) -> list[Term]:
+    """Return case and comparison of each target; raise InputError that names the target."""
+    names = {parameter.name for parameter in parameters}
+    result: list[Term] = []
+    own, row = len(names), 0
     for number, target in enumerate(targets, start=1):
         label = "target" if len(targets) == 1 else f"target {number}"
-        require_kind(f"{label}: fixed", target.fixed, Mapping)
-        for name in target.fixed:
-            if name in names or name == "model":
-                refuse(
-                    f"{label}: fixed {name} is not allowed",
-                    "keys of ball, drop and model that are not among [parameters]",
-                )
-        target_case, density = fix_keys(case, target.fixed, f"{label}: fixed")
-        target_case = target_case if density is None else with_density(target_case, density)
+        target_case = _with_fixed(case, target.fixed, names, label)
         try:
             if target.fixed:
                 check_case(replace(target_case, modes=None))
-            result.append((target_case, target.misfit()))
+            comparison = target.compare()
         except InputError as error:
             if len(targets) == 1:
                 raise
             message = f"{label}: {str(error).removeprefix('target: ')}"
             raise InputError(message, error.note) from error
+        ends = own + len(comparison.own), row + comparison.size
+        result.append(Term(target_case, comparison, slice(own, ends[0]), slice(row, ends[1])))
+        own, row = ends
     return result
 
 
+def _with_fixed(
+    case: Case, fixed: Mapping[str, object], fitted: AbstractSet[str], label: str
+) -> Case:
+    """Return the case of a target with its fixed keys."""
+    require_kind(f"{label}: fixed", fixed, Mapping)
+    if not fixed:
+        return case
+    if wrong := [name for name in fixed if name in fitted or name == "model"]:
+        refuse(
+            f"{label}: fixed {wrong[0]} is not allowed",
+            "keys of ball, drop and model that are not among [parameters]",
+        )
+    result, density = fix_keys(case, fixed, f"{label}: fixed")
+    return result if density is None else with_density(result, density)
+
+
 def _search(
-    pairs: list[tuple[Case, Misfit]],
-    ranges: list[Range],
-    options: Mapping[str, Any],
-    *,
-    progress: bool,
+    terms: list[Term], ranges: list[Range], options: Mapping[str, Any], *, progress: bool
 ) -> Fit:
-    pairs = [(_with_mesh(case, misfit, ranges), misfit) for case, misfit in pairs]
-    return search(pairs, ranges, options, progress=progress)
+    start = {entry.name: entry.start for entry in ranges}
+    terms = [term._replace(case=_with_mesh(term.case, start)) for term in terms]
+    return search(terms, ranges, options, progress=progress)
 
 
-def _with_mesh(case: Case, misfit: Misfit, ranges: list[Range]) -> Case:
+def _with_mesh(case: Case, start: Mapping[str, float]) -> Case:
     """Return a case whose automatic finite elements are those of the start of a search.
 
     The elements would change between points of the search, and with them a level by up to 0.2 dB.
@@ -185,9 +199,8 @@ def _with_mesh(case: Case, misfit: Misfit, ranges: list[Range]) -> Case:
     model = case.model
     if not isinstance(model, FiniteElement) or model.radial_elements or model.polar_elements:
         return case
-    start = {entry.name: entry.start for entry in ranges}
     try:
-        quantities = misfit.solve(with_values(case, start)).model_quantities
+        quantities = compute(with_values(case, start)).model_quantities
     except ThudError:
         return case  # The search reports it.
     mesh = replace(
@@ -207,101 +220,96 @@ def _require_options(options: Mapping[str, Any]) -> None:
 
 
 @dataclass(frozen=True)
-class FitStudy(Study):
-    """A fit as a file describes it: targets, the tables of the file, options of the search."""
+class FitStudy:
+    """A fit as a file describes it, complete and checked.
 
-    targets: tuple[Target, ...] = ()
-    tables: dict[str, Any] = field(default_factory=dict)
-    options: dict[str, Any] = field(default_factory=lambda: dict(OPTIONS))
+    Attributes
+    ----------
+    name : str
+        Name of the fit and of its directory.
+    case : Case
+        The case, with the fixed keys.
+    parameters : tuple of Parameter
+        The parameters that are fitted.
+    terms : list of Term
+        Case and comparison of each target.
+    options : dict
+        Options of the search, see `OPTIONS`.
+    tables : dict
+        The tables of the file.
+    inputs : tuple of path-like
+        Files that it is read from.
+    """
 
-    def kind_settings(self) -> dict[str, str]:
-        """Return the settings of targets and search."""
-        tables = self.tables["target"]
-        tables = tables if isinstance(tables, list) else [tables]
-        result: dict[str, str] = {}
-        for end, table, (_, misfit) in zip(
-            file_ends(len(tables)), tables, self.pairs(), strict=True
-        ):
-            result |= {f"[target{end}] {key}": f"{value!r}" for key, value in table.items()}
-            digest = hashlib.sha256(misfit.data().tobytes()).hexdigest()[:16]
-            result[f"numbers of [target{end}]"] = digest
-        return result | {name: f"{value!r}" for name, value in self.options.items()}
+    name: str
+    case: Case
+    parameters: tuple[Parameter, ...]
+    terms: list[Term]
+    options: dict[str, Any]
+    tables: dict[str, Any]
+    inputs: tuple[str | os.PathLike[str], ...]
 
-    def pairs(self) -> list[tuple[Case, Misfit]]:
-        """Return the case and the misfit of each target."""
-        return _pairs(self.case, self.targets, {parameter.name for parameter in self.parameters})
+    @property
+    def files(self) -> list[str]:
+        """Names of all files of the results."""
+        ends = file_ends(len(self.terms))
+        names = (name for end in ends for name in (f"fit{end}.csv", f"fitted{end}.nml"))
+        return ["fit.json", *names, *(f"fit{end}.svg" for end in ends), "confidence.svg"]
 
 
-class FitKind(Kind[FitStudy, Fit]):
-    """Fits as a kind of study."""
+def read_fit_study(source: str | os.PathLike[str] | Mapping[str, object]) -> FitStudy:
+    """Read a fit from a TOML file, or from a mapping of the same content; see docs/fit.md.
 
-    name = "fit"
-    own_keys = ("target", *OPTIONS)
-
-    def new_parameter(self, name: str, entry: object, case: Case, density: object) -> Parameter:  # noqa: ARG002
-        """Return a parameter that is fitted."""
-        return fitted_parameter(name, entry, case)
-
-    def complete(self, study: Study, content: Mapping[str, Any], folder: Path) -> FitStudy:
-        """Return a study with its targets."""
-        names = {parameter.name for parameter in study.parameters}
-        if study.density is not None and names & {"outer_radius", "wall_thickness"}:
-            refuse("[fixed] density is not allowed if the geometry is fitted", "mass")
+    Raises InputError if it is invalid; the message names file, table, key and what is allowed.
+    """
+    with read_tables(source) as (content, folder, _):
+        study = read_common(
+            content, folder, "fit", ("target", *OPTIONS),
+            lambda name, entry, case, _: fitted_parameter(name, entry, case),
+        )  # fmt: skip
         case = study.case
         if study.density is not None:
+            names = {parameter.name for parameter in study.parameters}
+            if names & {"outer_radius", "wall_thickness"}:
+                refuse("[fixed] density is not allowed if the geometry is fitted", "mass")
             case = with_density(case, study.density)
         tables = content.get("target")
         if not isinstance(tables, list):
             tables = [table_of(content, "target")]
         elif not tables or not all(isinstance(table, dict) for table in tables):
             refuse_value("target", tables, "a table [target], or several [[target]]")
-        targets = tuple(read_target(table, folder) for table in tables)
+        targets = [read_target(table, folder) for table in tables]
         options = {name: content.get(name, default) for name, default in OPTIONS.items()}
         _require_options(options)
         get_ranges(case, study.parameters)
         # JSON knows neither dates nor infinity.
         shown = json.loads(json.dumps(content, default=str), parse_constant=str)
-        common = {**vars(study), "case": case}
-        result = FitStudy(**common, targets=targets, tables=shown, options=options)
-        result.pairs()
-        return result
-
-    def compute(
-        self,
-        study: FitStudy,
-        results: StudyDirectory | None,  # noqa: ARG002
-        **options: Unpack[RunOptions],
-    ) -> Fit:
-        """Return the fit."""
-        return _search(
-            study.pairs(),
-            get_ranges(study.case, study.parameters),
-            study.options,
-            progress=options.get("progress", False),
-        )
-
-    def identity_files(self, study: FitStudy) -> list[str]:  # noqa: ARG002
-        """Return the name of the file that holds the identity."""
-        return ["fit.json"]
-
-    def identity_in(self, path: Path) -> dict[str, str]:
-        """Return the identity of a fit."""
-        return dict(json.loads(read_input(path))["identity"])
-
-    def listed_files(self, study: FitStudy) -> list[str]:
-        """Return the names of all files."""
-        ends = file_ends(len(study.targets))
-        names = [*(f"fit{end}" for end in ends), "confidence"]
-        figures = [f"{name}{ending}" for name in names for ending in FORMATS]
-        files = [
-            "fit.json",
-            *(name for end in ends for name in (f"fit{end}.csv", f"fitted{end}.nml")),
-        ]
-        return [*files, *figures]
-
-    def files(self, result: Fit, study: FitStudy) -> dict[str, bytes]:
-        """Return the numbers of the fit and its case."""
-        return result.files(study=study.tables, identity=study.identity)
+        terms = _terms(case, targets, study.parameters)
+        own = () if isinstance(source, Mapping) else (source,)
+        inputs = (*own, *named_files(content, folder))
+        return FitStudy(study.name, case, study.parameters, terms, options, shown, inputs)
 
 
-KIND = FitKind()
+def run_fit(
+    source: str | os.PathLike[str] | Mapping[str, object] | FitStudy,
+    output: str | os.PathLike[str] | None = None,
+    *,
+    figures: bool = False,
+    progress: bool = False,
+    replace: bool = False,
+) -> Fit:
+    """Return the fit that a file describes, also written to a directory.
+
+    Raises InputError, before the search, if the directory may not be replaced; see `Fit.save`.
+    """
+    study = source if isinstance(source, FitStudy) else read_fit_study(source)
+    results = None
+    if output is not None:
+        results = Results(Path(output), "fit", study.name, study.inputs, replace=replace)
+        results.require(study.files)
+    ranges = get_ranges(study.case, study.parameters)
+    result = _search(study.terms, ranges, study.options, progress=progress)
+    if results:
+        contents = result.files(study=study.tables)
+        results.write(contents | (result.figure_files() if figures else {}))
+    return result

@@ -26,7 +26,6 @@ KINDS = {
     "sensitivity": KindInfo("Sobol indices: how much each parameter affects each result"),
     "design": KindInfo("which geometries and materials conform to the standards"),
     "uncertainty": KindInfo("effect of tolerances on levels and conformity"),
-    "fit": KindInfo("parameters of a model from a force or from levels", has_samples=False),
 }
 
 
@@ -49,7 +48,7 @@ def read_study(source: Source, kind: str = "sweep") -> Study:
     source
         Path of a TOML file, or its content as a mapping; see docs/studies.md.
     kind
-        ``"sweep"``, ``"sensitivity"``, ``"design"``, ``"uncertainty"`` or ``"fit"``.
+        ``"sweep"``, ``"sensitivity"``, ``"design"`` or ``"uncertainty"``.
 
     Returns
     -------

@@ -7,7 +7,7 @@ directions in which the model may be wrong, by about as much as the alternatives
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from thud.base._schema import FiniteElement, InfinitePlate, ModalBall
 from thud.base.checks import refuse_unknown, refuse_value, shown
@@ -33,43 +33,30 @@ class Alternative(NamedTuple):
     case: Case
 
 
-def _damping_law(case: Case) -> list[dict[str, object]]:
-    name = ""
-    if isinstance(case.model, ModalBall):
-        name = "damping_law"
-    elif isinstance(case.model, FiniteElement) and case.model.viscosity not in {"none", "prony"}:
-        name = "viscosity"
-    return [{name: "fractional", "fractional_order": order} for order in ORDERS if name]
+def _damping_laws(name: str) -> list[dict[str, object]]:
+    """Return keys of fractional damping laws; `name` is the key of the law."""
+    return [{name: "fractional", "fractional_order": order} for order in ORDERS]
 
 
-def _friction(case: Case) -> list[dict[str, object]]:
-    if isinstance(case.model, ModalBall):
-        return [{"floor_friction": "stick" if case.model.floor_friction == "none" else "none"}]
-    if isinstance(case.model, FiniteElement):
-        return [{"friction": 0.0 if case.model.friction else 1.0}]
-    return []
-
-
-def _gravity(case: Case) -> list[dict[str, object]]:
-    if isinstance(case.model, ModalBall):
-        return [{"contact_gravity": not case.model.contact_gravity}]
-    return []
-
-
-def _floor(case: Case) -> list[dict[str, object]]:
-    if isinstance(case.model, ModalBall | FiniteElement):
-        return [{"resistance": RESISTANCE}]
-    return []
-
-
-# Values of keys that a case may have instead of its own, by unknown. Shell and lumped models have
-# none: they are farther from a force than these alternatives are from each other.
-UNKNOWNS: Mapping[str, Callable[[Case], list[dict[str, object]]]] = {
-    "damping law": _damping_law,
-    "friction": _friction,
-    "gravity": _gravity,
-    "floor": _floor,
+_OTHER_FRICTION = {"none": "stick", "stick": "none"}
+# Laws of viscosity that may be another one: prony states its relaxation times.
+_LAWS = ("kelvin_voigt", "fractional", "constant_loss")
+# Values of keys that a case may have instead of its own, by model and unknown. Shell and lumped
+# models have none: they are farther from a force than these alternatives are from each other.
+_ALTERNATIVES: dict[type, dict[str, Callable[[Any], list[dict[str, object]]]]] = {
+    ModalBall: {
+        "damping law": lambda _: _damping_laws("damping_law"),
+        "friction": lambda m: [{"floor_friction": _OTHER_FRICTION[m.floor_friction]}],
+        "gravity": lambda m: [{"contact_gravity": not m.contact_gravity}],
+        "floor": lambda _: [{"resistance": RESISTANCE}],
+    },
+    FiniteElement: {
+        "damping law": lambda m: _damping_laws("viscosity") if m.viscosity in _LAWS else [],
+        "friction": lambda m: [{"friction": 0.0 if m.friction else 1.0}],
+        "floor": lambda _: [{"resistance": RESISTANCE}],
+    },
 }
+UNKNOWNS = tuple(_ALTERNATIVES[ModalBall])
 # Keys that, if they are fitted, take the place of an unknown.
 _FITTED = {"fractional_order": "damping law", "friction": "friction"}
 
@@ -104,7 +91,7 @@ def alternatives(
             " and ".join(f"{key} {shown(value)}" for key, value in values.items()),
             with_values(on_plate if name == "floor" else rigid, values),
         )
-        for name in UNKNOWNS
+        for name, values_of in _ALTERNATIVES.get(type(case.model), {}).items()
         if name in unknowns and name not in known
-        for values in UNKNOWNS[name](case)
+        for values in values_of(case.model)
     ]

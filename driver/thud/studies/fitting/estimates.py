@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from thud.base.display import Displayed, warn_if_not_drawn
+from thud.base.extras import data_frame, require_extra
+from thud.base.files import Results
 from thud.base.units import display_unit
-from thud.studies.fitting.inference import coverage_factor
-from thud.studies.study_result import StudyResult
+from thud.studies.fitting.fit_report import parameter_rows
+from thud.studies.fitting.inference import coverage_factor, require_confidence
 
 if TYPE_CHECKING:
+    import os
+    from collections.abc import Mapping, Sequence
+
+    import pandas as pd
+    import xarray as xr
+    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.base.note import Note
@@ -20,7 +31,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Estimates(StudyResult):
+class Estimates(Displayed):
     """The best parameters of a model for a target, and their uncertainty; SI units.
 
     Attributes
@@ -39,9 +50,14 @@ class Estimates(StudyResult):
         Standard deviation of a residual, N or dB.
     residuals : ndarray, shape (n_residual,)
         Model minus measured values.
+    degrees_of_freedom : int
+        Number of residuals − number of parameters, nuisance parameters included.
+    interval_freedom : int or None
+        Degrees of freedom of Student's t in the intervals: those of the data that determine the
+        noise; None: they are normal.
     warnings : tuple of Note
         Why estimates or intervals may be wrong.
-    assumptions : tuple of str
+    assumptions : tuple of Note
         Which unknowns the intervals include, and the effect of errors that no data can show.
     widened : float
         Factor of the standard errors due to noise and unknowns, because residuals, or unknowns of a
@@ -56,8 +72,10 @@ class Estimates(StudyResult):
     confidence: float
     noise: float
     residuals: Array
+    degrees_of_freedom: int
+    interval_freedom: int | None
     warnings: tuple[Note, ...]
-    assumptions: tuple[str, ...]
+    assumptions: tuple[Note, ...]
     widened: float
 
     @property
@@ -74,32 +92,12 @@ class Estimates(StudyResult):
     @property
     def correlation(self) -> Array:
         """Correlation of the parameters, shape (n, n); NaN where a variance is infinite."""
-        errors = np.sqrt(np.diag(self.covariance))
-        with np.errstate(invalid="ignore"):
-            result: Array = self.covariance / np.outer(errors, errors)
-        return result
+        return correlation_of(self.covariance)
 
     @property
-    def degrees_of_freedom(self) -> int:
-        """Number of residuals − number of parameters."""
-        return len(self.residuals) - len(self.names)
-
-    @property
-    def interval_freedom(self) -> int | None:
-        """Degrees of freedom of Student's t in the intervals; None: they are normal."""
-        return self.degrees_of_freedom
-
-    def intervals(self, confidence: float | None = None) -> dict[str, tuple[float, float]]:
-        """Return confidence intervals by name, see `interval_freedom`.
-
-        They are cut at the limits of the search. `confidence` is by default that of the fit.
-        """
-        confidence = self.confidence if confidence is None else confidence
-        factor = coverage_factor(confidence, self.interval_freedom)
-        half = factor * np.sqrt(np.diag(self.covariance))
-        low = np.maximum(self.estimate - half, self.limits[:, 0]).tolist()
-        high = np.minimum(self.estimate + half, self.limits[:, 1]).tolist()
-        return dict(zip(self.names, zip(low, high, strict=True), strict=True))
+    def notes(self) -> tuple[Note, ...]:
+        """Notes on what was done, and on the impacts of the model."""
+        return ()
 
     @property
     def display_units(self) -> dict[str, tuple[str, float]]:
@@ -107,34 +105,91 @@ class Estimates(StudyResult):
         pairs = zip(self.values.items(), self.units, strict=True)
         return {name: display_unit(unit, value) for (name, value), unit in pairs}
 
-    @property
-    def trust(self) -> tuple[str, ...]:
-        """Lines of text on what the intervals include."""
-        if self.widened == 1:
-            return self.assumptions
-        text = f"intervals widened {self.widened:.3g} times, see the warnings"
-        return (*self.assumptions, text)
+    def intervals(self, confidence: float | None = None) -> dict[str, tuple[float, float]]:
+        """Return confidence intervals by name, see `interval_freedom`.
+
+        They are cut at the limits of the search. `confidence` is by default that of the fit.
+        Raises InputError if it is not between 0 and 1.
+        """
+        confidence = self.confidence if confidence is None else confidence
+        require_confidence(confidence)
+        factor = coverage_factor(confidence, self.interval_freedom)
+        half = factor * np.sqrt(np.diag(self.covariance))
+        low = np.maximum(self.estimate - half, self.limits[:, 0]).tolist()
+        high = np.minimum(self.estimate + half, self.limits[:, 1]).tolist()
+        return dict(zip(self.names, zip(low, high, strict=True), strict=True))
+
+    @abstractmethod
+    def columns(self) -> Mapping[str, Sequence[object] | Array]:
+        """Return measured values and model side by side, SI units, dB: columns by their names."""
+
+    @abstractmethod
+    def table(self) -> str:
+        """Return the fit as text."""
+
+    @abstractmethod
+    def plot(self) -> Figure:
+        """Draw measured values and model."""
+
+    @abstractmethod
+    def files(self) -> dict[str, bytes]:
+        """Return the contents of the files of `save`, but figures, by name."""
+
+    def figures(self) -> dict[str, Figure]:
+        """Return all figures by the names of their files."""
+        return {"fit": self.plot()}
 
     def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text."""
-        interval = f"{self.confidence:.0%} interval"
-        rows: list[tuple[str, ...]] = [("parameter", "value", "standard error", interval, "unit")]
-        intervals = self.intervals()
-        for name, (unit, factor) in self.display_units.items():
-            value, error = self.values[name] / factor, self.standard_errors[name] / factor
-            low, high = (end / factor for end in intervals[name])
-            digits = _digits(value, error)
-            interval = f"{low:.{digits}g} to {high:.{digits}g}" if np.isfinite(error) else "unknown"
-            rows.append((name, f"{value:.{digits}g}", f"{error:.2g}", interval, unit))
-        return rows
+        """Return header and rows of text: the parameters."""
+        return parameter_rows(self)
 
     def __str__(self) -> str:
         """Return the table, and the warnings."""
         return "\n".join([self.table(), *(f"Warning: {note}." for note in self.warnings)])
 
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return measured values and model side by side; SI units, dB."""
+        return data_frame({name: np.asarray(values) for name, values in self.columns().items()})
 
-def _digits(value: float, error: float) -> int:
-    """Return the number of digits of a value that resolves its error to two digits."""
-    if not (np.isfinite(error) and error > 0 and value):
-        return 6
-    return int(np.clip(np.ceil(np.log10(abs(value) / error)) + 2, 3, 12))
+    def to_xarray(self) -> xr.Dataset:
+        """Return the same columns over ``point``, and the estimates over ``parameter``."""
+        with require_extra("studies"):
+            import xarray as xr
+
+        axes = ("parameter", "other_parameter")
+        return xr.Dataset(
+            {
+                **{name: ("point", np.asarray(v)) for name, v in self.columns().items()},
+                "estimate": ("parameter", self.estimate),
+                "unit": ("parameter", list(self.units)),
+                "covariance": (axes, self.covariance),
+            },
+            {axis: list(self.names) for axis in axes},
+        )
+
+    def figure_files(self) -> dict[str, bytes]:
+        """Return the contents of the files of the figures by name; a warning if there are none."""
+        with warn_if_not_drawn("the figure of the fit"):
+            from thud.plot import figure_files
+
+            return figure_files(self.figures())
+        return {}
+
+    def save(
+        self, directory: str | os.PathLike[str], *, figures: bool = True, replace: bool = False
+    ) -> list[Path]:
+        """Write the files of `files`, and the figures; return their paths.
+
+        The directory is replaced as a whole; with `replace` also one with results of something
+        else. Raises InputError if it holds any other file, OSError if a file cannot be written.
+        """
+        contents = self.files() | (self.figure_files() if figures else {})
+        return Results(Path(directory), "fit", replace=replace).write(contents)
+
+
+def correlation_of(covariance: Array) -> Array:
+    """Return the correlation of a covariance, shape (n, n); NaN where a variance is infinite."""
+    errors = np.sqrt(np.diag(covariance))
+    with np.errstate(invalid="ignore"):
+        result: Array = covariance / np.outer(errors, errors)
+    return result

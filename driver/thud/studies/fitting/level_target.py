@@ -10,9 +10,9 @@ import numpy as np
 
 from thud.base._schema import SAMPLE_QUANTITIES
 from thud.base.checks import refuse, refuse_unknown, require_choice, shown
-from thud.base.immutable import Plain, freeze
+from thud.base.immutable import Plain
 from thud.level.levels import BANDWIDTHS, FORCES, get_bands
-from thud.studies.fitting.misfit import Misfit, numbers, require_positive
+from thud.studies.fitting.comparison import STEP, Comparison, numbers, require_positive
 
 # Relative step of the derivatives of a contact time, which jumps by up to 1e-3 from node to node of
 # finite elements.
@@ -49,6 +49,8 @@ class LevelTarget(Plain):
     force : str or None
         ``"floor"`` or ``"elastic"``: the force of the model whose levels are compared; None: the
         assessed force of the case.
+    fixed : mapping of str to object
+        Keys of ball, drop and model that are different for this target, such as the drop height.
     """
 
     levels: Sequence[float]
@@ -59,8 +61,8 @@ class LevelTarget(Plain):
     force: LevelsForce | None = None
     fixed: Mapping[str, object] = field(default_factory=dict)
 
-    def misfit(self) -> LevelMisfit:
-        """Return the misfit of the target."""
+    def compare(self) -> LevelComparison:
+        """Return the comparison of an impact with the levels."""
         require_choice("target: bands", self.bands, BANDWIDTHS)
         if self.force is not None:
             require_choice("target: force", self.force, FORCES)
@@ -90,37 +92,49 @@ class LevelTarget(Plain):
         deviation = np.concatenate([deviation, [pair[1] for pair in quantities.values()]])
         for value in deviation.tolist():
             require_positive("uncertainty", value, "dB or SI units")
-        return LevelMisfit(
-            self, [nominal.index(f) for f in frequencies], target, deviation, list(quantities)
+        return LevelComparison(
+            data=np.concatenate([target, deviation]),
+            weighted_target=target / deviation,
+            known_noise=self.uncertainty is not None,
+            step=CONTACT_STEP if "contact_time" in quantities else STEP,
+            bands=self.bands,
+            force=self.force,
+            indices=[nominal.index(f) for f in frequencies],
+            extra=list(quantities),
+            target=target,
+            deviation=deviation,
         )
 
 
-class LevelMisfit(Misfit):
-    """How far levels of an impact are from a target."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LevelComparison(Comparison):
+    """Levels and other quantities, prepared for a fit; see `Comparison` for the rest.
 
-    deviation_unit = "dB"
-    deviation_source = "uncertainty"
+    Attributes
+    ----------
+    bands : str
+        ``"octave"`` or ``"third"``.
+    force : str or None
+        Force of the model; None: the assessed one.
+    indices : list of int
+        Indices of the compared bands.
+    extra : list of str
+        Names of the other quantities.
+    target, deviation : ndarray, shape (size,)
+        Compared quantities and their standard deviations, dB, s and 1.
+    """
 
-    def __init__(
-        self,
-        target: LevelTarget,
-        indices: list[int],
-        values: Array,
-        deviation: Array,
-        extra: list[str],
-    ) -> None:
-        self.bands, self.kind = target.bands, target.force
-        self.indices, self.extra = indices, extra
-        self.target, self.deviation = freeze(values), freeze(deviation)
-        self.known_noise = target.uncertainty is not None
-        self.size = len(values)
-        self.own = {}
-        if "contact_time" in extra:
-            self.step = CONTACT_STEP
+    unit = "dB"
+    bands: BandSet
+    force: LevelsForce | None
+    indices: list[int]
+    extra: list[str]
+    target: Array
+    deviation: Array
 
     def values(self, impact: Impact) -> Array:
         """Return levels, dB, and other quantities, s and 1, of an impact, shape (size,)."""
-        levels = impact.levels(self.bands, force=self.kind)[self.indices]
+        levels = impact.levels(self.bands, force=self.force)[list(self.indices)]
         exact = {"contact_time": "exact_contact_time"}
         extra = [impact.quantity(exact.get(name, name)) for name in self.extra]
         return np.concatenate([levels, extra])
@@ -128,14 +142,6 @@ class LevelMisfit(Misfit):
     def residual(self, impact: Impact, own: Array) -> Array:  # noqa: ARG002
         """Return model minus target over standard deviation, shape (size,)."""
         return (self.values(impact) - self.target) / self.deviation
-
-    def target_vector(self) -> Array:
-        """Return the target over standard deviation, shape (size,)."""
-        return self.target / self.deviation
-
-    def data(self) -> Array:
-        """Return values and deviations of the target, dB, s and 1."""
-        return np.concatenate([self.target, self.deviation])
 
     def columns(self, impact: Impact, own: Array) -> dict[str, list[object]]:  # noqa: ARG002
         """Return target and model side by side, dB, s and 1: columns by their names."""

@@ -6,8 +6,7 @@ frequency. `to_grid` is orthonormal: white noise stays white and keeps its devia
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,7 +23,7 @@ from thud.recordings.background import (
     unit_covariances,
 )
 from thud.recordings.drops import CELL, FOOT, MARGIN, MAX_BACKGROUND
-from thud.studies.fitting.inference import UNLIKELY
+from thud.studies.fitting.residual_tests import UNLIKELY
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -87,31 +86,33 @@ def find_pulse(force: Array, rate: float) -> tuple[int, int]:
 
 
 @dataclass(frozen=True, eq=False)
-class BackgroundRecord:
-    """Background of a record, before and after its pulse.
+class Quiet:
+    """Background of a record, up to 0.1 s before and after its pulse.
 
     Attributes
     ----------
-    force : ndarray, shape (n_sample,)
-        The record, N.
-    rate : float
-        Samples per second, Hz.
-    pulse : tuple of int
-        First sample of the pulse, and the stop (exclusive).
+    cells : tuple of ndarray, shape (n_cell,)
+        Begins and ends of cells, s from the middle of the pulse. Their width is that of the band:
+        wider cells would not show the noise of its upper end.
+    mean : ndarray, shape (n_cell,)
+        Mean forces in the cells − their median, N.
+    peak : float
+        Maximum of the record − its median, N.
+    seconds, middle : float
+        Length of the background, and middle of the pulse from the first sample, s.
+    deviation : float
+        Standard deviation of the background, N.
     below : float
         Highest frequency that counts, Hz.
     """
 
-    force: Array
-    rate: float
-    pulse: tuple[int, int]
+    cells: Cells
+    mean: Array
+    peak: float
+    seconds: float
+    middle: float
+    deviation: float
     below: float
-
-    @property
-    def seconds(self) -> float:
-        """Length of the background that counts, s."""
-        sides = (self.pulse[0] / self.rate, (len(self.force) - self.pulse[1]) / self.rate)
-        return sum(min(side, MAX_BACKGROUND) for side in sides)
 
     @property
     def freedom(self) -> int:
@@ -123,91 +124,67 @@ class BackgroundRecord:
         """Whether there is enough of it to determine the noise."""
         return self.freedom >= MIN_BACKGROUND
 
-    @property
-    def middle(self) -> float:
-        """Middle of the pulse, s from the first sample."""
-        return (self.pulse[0] + self.pulse[1]) / 2 / self.rate
-
-    def deviation(self) -> float:
-        """Return the standard deviation of the background, N."""
-        first, stop = self.pulse
-        return float(np.std(np.concatenate([self.force[:first], self.force[stop:]])))
-
-    @cached_property
-    def _means(self) -> tuple[Cells, Array]:
-        """Cells of the background, s from the middle of the pulse, and their means − median, N.
-
-        Their width is that of the band: wider cells would not show the noise of its upper end.
-        Background farther than 0.1 s away is left out, whatever the window.
-        """
-        width = max(1, int(self.rate / (2 * self.below)))
-        first, stop = self.pulse
-        most = int(MAX_BACKGROUND * self.rate)
-        counts = [min(length, most) // width for length in (first, len(self.force) - stop)]
-        before = first - width * np.arange(1 + counts[0])[::-1]
-        after = stop + width * np.arange(1 + counts[1])
-        (begin, end), mean = cell_means(self.force, self.rate, before, after)
-        return (begin - self.middle, end - self.middle), mean - np.median(mean)
-
     def background(self, tones: Sequence[float] = ()) -> Background:
         """Return the most likely noise: white, pink, brown and hum of 50 and 60 Hz.
 
         Tones, Hz, are removed first, by least squares.
         """
-        cells, mean = self._means
-        waves = cell_waves(cells, tones)
-        residual = mean - waves @ np.linalg.lstsq(waves, mean)[0]
-        peak = float(self.force.max() - np.median(self.force))
-        logarithms, log_covariance = fit_noise(cells, residual, peak)
+        waves = cell_waves(self.cells, tones)
+        residual = self.mean - waves @ np.linalg.lstsq(waves, self.mean)[0]
+        logarithms, log_covariance = fit_noise(self.cells, residual, self.peak)
         # The waves have absorbed part of the noise.
-        scale = np.where(np.arange(5) < 3, len(mean) / (len(mean) - waves.shape[1] + 1), 1.0)  # noqa: PLR2004
-        return Background(cells, residual, scale * np.exp(logarithms), peak, log_covariance)
+        n = len(self.mean)
+        scale = np.where(np.arange(5) < 3, n / (n - waves.shape[1] + 1), 1.0)  # noqa: PLR2004
+        variances = scale * np.exp(logarithms)
+        return Background(self.cells, residual, variances, self.peak, log_covariance)
 
     def tones(self) -> tuple[float, ...]:
         """Return the frequencies of tones, Hz, which noise and hum of 50 and 60 Hz do not explain.
 
         A tone must raise the likelihood by more than the search over all frequencies does.
         """
-        cells, mean = self._means
-        span = 2 * float(np.abs(cells).max())
-        step = 1 / (4 * span)
+        step = 1 / (8 * float(np.abs(self.cells).max()))
         grid = np.arange(MIN_HUM, HARMONIC_EDGE * self.below, step)
         # The noise includes hum of the mains.
         grid = grid[np.abs(grid[:, np.newaxis] - MAINS).min(axis=1) > 2 * step]
         min_gain = float(np.log(len(grid) / UNLIKELY))
         result: tuple[float, ...] = ()
-        best = _log_likelihood(self.background())
+        background = self.background()
+        best = log_likelihood(background)
         while len(result) < MAX_TONES:
-            waves = cell_waves(cells, result)
-            residual = mean - waves @ np.linalg.lstsq(waves, mean)[0]
             tried = [
-                (_log_likelihood(self.background((*result, tone))), tone)
-                for whiten in (_trendless(cells), self.background(result).whiten)
-                for tone, gain in [_strongest(cells, whiten @ residual, whiten, grid)]
+                (log_likelihood(self.background((*result, tone))), tone)
+                for whiten in (_trendless(self.cells), background.whiten)
+                for tone, gain in [strongest_tone(self.cells, background.mean, whiten, grid)]
                 if gain > min_gain
             ]
             likelihood, tone = max(tried, default=(best, 0.0))
             if likelihood < best + min_gain:
                 break
             best, result = likelihood, (*result, tone)
+            background = self.background(result)
         return result
 
-    def mains(
-        self, background: Background, tones: Sequence[float] = ()
-    ) -> tuple[float, float, float]:
-        """Return the mains frequency, Hz, and the amplitude and standard error of its hum, N.
 
-        By generalized least squares with the other noise of the background and tones, Hz.
-        """
-        cells, mean = self._means
-        tone = MAINS[int(np.argmax(background.variances[3:]))]
-        others = np.append(background.variances[:3], np.zeros(len(MAINS)))
-        whiten = replace(background, variances=others).whiten
-        basis, triangle = np.linalg.qr(whiten @ cell_waves(cells, [tone, *tones])[:, 1:])
-        inverse = np.linalg.inv(triangle)
-        value, covariance = inverse @ (basis.T @ (whiten @ mean)), inverse @ inverse.T
-        pair = np.array([0, 1 + len(tones)])
-        return (tone, *wave_size(value[pair], covariance[np.ix_(pair, pair)]))
+def find_quiet(force: Array, rate: float, pulse: tuple[int, int], below: float) -> Quiet:
+    """Return the background of a record, N, beside its pulse: first sample, and stop."""
+    first, stop = pulse
+    sides = first, len(force) - stop
+    width = max(1, int(rate / (2 * below)))
+    counts = [min(side, int(MAX_BACKGROUND * rate)) // width for side in sides]
+    before = first - width * np.arange(1 + counts[0])[::-1]
+    after = stop + width * np.arange(1 + counts[1])
+    (begin, end), mean = cell_means(force, rate, before, after)
+    middle = (first + stop) / 2 / rate
+    return Quiet(
+        (begin - middle, end - middle),
+        mean - np.median(mean) if len(mean) else mean,
+        peak=float(force.max() - np.median(force)),
+        seconds=sum(min(side / rate, MAX_BACKGROUND) for side in sides),
+        middle=middle,
+        deviation=float(np.std(np.concatenate([force[:first], force[stop:]]))) if any(sides) else 0,
+        below=below,
+    )
 
 
 def wave_size(value: Array, covariance: Array) -> tuple[float, float]:
@@ -226,12 +203,12 @@ def cell_waves(cells: Cells, tones: Sequence[float]) -> Array:
     return np.concatenate([constant, weight * np.cos(phase), weight * np.sin(phase)], axis=1)
 
 
-def _strongest(cells: Cells, mean: Array, whiten: Array, grid: Array) -> tuple[float, float]:
-    """Return the frequency of the strongest tone in whitened means, Hz, and its gain.
+def strongest_tone(cells: Cells, mean: Array, whiten: Array, grid: Array) -> tuple[float, float]:
+    """Return the frequency of the strongest tone in means of cells, Hz, and its gain.
 
     The gain is that of the logarithm of the likelihood, the deviation of the noise estimated.
     """
-    tone = 0.0
+    tone, mean = 0.0, whiten @ mean
     for _ in range(2):
         waves = np.moveaxis(cell_waves(cells, grid.tolist())[:, 1:].reshape(-1, 2, len(grid)), 2, 0)
         basis, _ = np.linalg.qr(whiten @ waves)
@@ -251,7 +228,7 @@ def _trendless(cells: Cells) -> Array:
     return np.asarray(np.eye(len(middle)) - basis @ basis.T, dtype=np.float64)
 
 
-def _log_likelihood(background: Background) -> float:
+def log_likelihood(background: Background) -> float:
     """Return the logarithm of the likelihood of background cells."""
     whiten = background.whiten
     white = whiten @ background.mean
@@ -314,7 +291,8 @@ def hum_harmonics(hum: float, below: float) -> tuple[float, ...]:
 
 
 def new_weights(  # noqa: PLR0913 - components of the noise
-    record: BackgroundRecord,
+    time: Array,
+    rate: float,
     count: int,
     *,
     background: Background | None,
@@ -323,14 +301,14 @@ def new_weights(  # noqa: PLR0913 - components of the noise
     tones: Sequence[float],
     mains: bool,
 ) -> Weights:
-    """Return the weights of a record on a grid of `count` points.
+    """Return the weights of a record at times, s from the middle of the pulse, on a grid.
 
-    `noise` is the standard deviation of white noise, N, instead of the noise of the background; if
-    neither is known, it is 1 N. Waves of the `tones`, Hz, and an `offset` are nuisance parameters;
-    with `mains`, hum of 50 and 60 Hz is included as found in the background.
+    The grid has `count` points. `noise` is the standard deviation of white noise, N, instead of the
+    noise of the background; if neither is known, it is 1 N. Waves of the `tones`, Hz, and an
+    `offset` are nuisance parameters; with `mains`, hum of 50 and 60 Hz is included as found in the
+    background.
     """
-    n, rate = len(record.force), record.rate
-    time = np.arange(n) / rate - record.middle
+    n = len(time)
     white, colored, humming = (noise or 1.0) ** 2, np.zeros(n), np.zeros(n)
     drift = 0.0
     if background is not None:
