@@ -14,7 +14,7 @@ from scipy import stats
 import thud
 from thud.case.keys import with_values
 from thud.studies.fitting import search
-from thud.studies.fitting.inference import infer, pair_notes, worst_directions
+from thud.studies.fitting.inference import infer, worst_directions
 from thud.studies.fitting.ranges import Range, bound_parameters, get_ranges
 
 if TYPE_CHECKING:
@@ -205,15 +205,6 @@ def test_worst_directions_are_axes_of_the_ellipsoid() -> None:
     for (_, direction), axis in zip(found, turn.T, strict=False):
         assert abs(direction[[0, 2, 3]] @ axis) == pytest.approx(1)
         assert direction[1] == 0
-
-
-def test_correlations_are_shown_to_the_digit_that_differs_from_1() -> None:
-    sizes = np.array([[1, 0.9987, 0.9979], [0, 1, -0.99996], [0, 0, 1]])
-    found = pair_notes("abc", np.where(sizes, sizes, sizes.T))
-    # The strongest first; from 0.998 on no model tells them apart.
-    shown = [(note.others["first"], note.others["second"], note.others["shown"]) for note in found]
-    assert shown == [("b", "c", "−0.99996"), ("a", "b", "0.999")]
-    assert pair_notes("abc", np.full((3, 3), np.nan)) == []
 
 
 def test_parameters_without_any_effect_are_all_lost() -> None:

@@ -202,7 +202,6 @@ def test_study_of_several_records(folder: Path, capsys: pytest.CaptureFixture[st
         ("height = 1.0", "heigth = 1.0", naming("'heigth'", "'height'")),
         ('unit = "cm"', 'unit = "N"', naming("target 1", "fixed height", "'N'", "cm")),
         ("gain = 0.02", "gain = 'no'", naming("target 2", "gain", "'no'")),
-        ("gain = 0.02", "hum = 3", naming("target 2", "hum", 3)),
         ("gain = 0.02", "window = [0.02, 0.05]", naming("target 2", "residuals")),
         ("drop_2.csv", "drop_9.csv", naming("drop_9.csv")),
     ],

@@ -28,7 +28,6 @@ from thud.studies.fitting.record_noise import (
     find_pulse,
     find_quiet,
     grid_covariance,
-    hum_harmonics,
     log_likelihood,
     new_weights,
     strongest_tone,
@@ -88,15 +87,6 @@ def test_amplitude_of_a_wave_has_the_uncertainty_of_its_parts() -> None:
     assert error == pytest.approx(np.hypot(*draws.T).std(), rel=0.01)
 
 
-def test_harmonics_of_hum_lie_below_the_band_edge() -> None:
-    assert hum_harmonics(50.0, 1250.0) == (50, 100, 150, 200, 250)
-    # 0.95 times 1250 Hz is 1187.5 Hz.
-    assert hum_harmonics(300.0, 1250.0) == (300, 600, 900)
-    assert hum_harmonics(395.8, 1250.0) == (395.8, 2 * 395.8, 3 * 395.8)
-    assert hum_harmonics(396.0, 1250.0) == (396, 792)
-    assert hum_harmonics(0.0, 1250.0) == ()
-
-
 def test_weights_are_those_of_generalised_least_squares() -> None:
     rng = np.random.default_rng(4)
     n = 12
@@ -124,11 +114,7 @@ def test_weights_are_those_of_generalised_least_squares() -> None:
 
 
 @pytest.mark.parametrize("given", [None, 2.0])
-@pytest.mark.parametrize("mains", [False, True])
-def test_weights_of_a_record_are_those_of_its_samples(
-    given: float | None,
-    mains: bool,  # noqa: FBT001
-) -> None:
+def test_weights_of_a_record_are_those_of_its_samples(given: float | None) -> None:
     n, count, rate = 301, 41, 3000.0
     time = (np.arange(n) - 145) / rate
     variances = np.array([3e-3, 0.3, 20.0, 1.0, 2.0])
@@ -141,12 +127,11 @@ def test_weights_of_a_record_are_those_of_its_samples(
         noise=given,
         offset=True,
         tones=[70.0],
-        mains=mains,
     )
     cells = time - 0.5 / rate, time + 0.5 / rate
     pink, brown, fifty, sixty = variances[1:, None, None] * unit_covariances(cells, cells)[:4]
     white = variances[0] * rate / 2 * np.eye(n)
-    predicted = (fifty + sixty) * mains + (0.1 * 900) ** 2 * np.outer(time, time)
+    predicted = fifty + sixty + (0.1 * 900) ** 2 * np.outer(time, time)
     noise = white + pink + brown if given is None else given**2 * np.eye(n)
     waves = np.stack([np.ones(n), np.cos(140 * np.pi * time), np.sin(140 * np.pi * time)], 1)
 
@@ -176,12 +161,10 @@ def test_quiet_counts_up_to_a_tenth_of_a_second() -> None:
     # 0.11 s on each side, of which 0.1 s count; two values for each hertz of the band and second.
     assert quiet.seconds == pytest.approx(0.2)
     assert quiet.freedom == 2 * 500 * 0.2 - 1
-    assert quiet.known
     assert quiet.middle == pytest.approx(0.12, abs=1 / RATE)
     assert quiet.deviation == pytest.approx(5, rel=4 / np.sqrt(2 * 0.22 * RATE))
     short = find_quiet(np.ones(500), RATE, (int(0.0105 * RATE), 500), 500.0)
     assert short.freedom == int(2 * 500 * int(0.0105 * RATE) / RATE) - 1
-    assert not short.known
     # Cells of a millisecond, one for each independent value of the band, next to the pulse.
     (begins, ends), mean = quiet.cells, quiet.mean
     width = int(RATE / 1000)
@@ -359,18 +342,6 @@ def test_offset_of_a_record_without_noise_is_no_misfit() -> None:
     assert not fit.warnings
 
 
-def test_hum_of_a_given_frequency_is_removed() -> None:
-    target = thud.ForceTarget(record("hum of 100 Hz, 10 N"), hum=50.0)
-    fit = thud.fit(target, TRUTH, CASE)
-    assert (np.abs(pulls(fit)) < FAR).all()
-    # Five harmonics, each with two waves, and the offset.
-    assert fit.degrees_of_freedom == len(fit.residuals) - len(fit.names) - 11
-    value, error = fit.targets[0].nuisances["hum of 100 Hz"]
-    assert abs(value - 10) < FAR * error
-    without = quiet_fit(thud.ForceTarget(target.record, hum=0, offset=False), TRUTH, CASE)
-    assert not without.targets[0].nuisances
-
-
 def test_noise_makes_no_tone() -> None:
     # A tone would be found in fewer than one record in a thousand.
     for seed in range(3):
@@ -434,8 +405,6 @@ def test_too_little_quiet_warns_unless_the_offset_is_decided() -> None:
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        ({"hum": 5.0}, naming("target", "hum", 5.0, 0, 10, "1250 Hz")),
-        ({"hum": "loud"}, naming("target", "hum", "'loud'")),
         ({"offset": 3}, naming("target", "offset", 3, "true", "false")),
         ({"gain": -0.1}, naming("target", "gain", -0.1, 0)),
         ({"fixed": 3}, naming("target", "fixed", 3)),

@@ -106,7 +106,7 @@ def _absolute(found: re.Match[str]) -> str:
 
 def _study(chance: random.Random) -> tuple[str, str]:
     """Return kind and text of a study: one of the examples, damaged, or one by grammar."""
-    kind = chance.choice(list(KINDS))
+    kind = chance.choice([*KINDS, "fit"])
     if chance.random() < 0.3:
         name = chance.choice(sorted(EXAMPLES))
         return chance.choice([kind, *[EXAMPLES[name]] * 9]), mutated_text(_original(name), chance)

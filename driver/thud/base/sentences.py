@@ -192,7 +192,6 @@ WARNINGS = {
     "+-{value:.0f} {unit} of its value",
     "hardly_identifiable": "{names} are hardly identifiable: along {changes} the {confidence:.0%} "
     "interval is +-{value:.0f} {unit}{product}",
-    "inseparable": "{first} and {second} cannot be separated: correlation {shown}",
     "at_limit": "{name} ended at its limit, {limit}: its interval is cut there, and all intervals "
     "hold inside the limits only",
     "alternative_seen": "the residuals contain the effect of {alternative} ({value:.3g} standard "

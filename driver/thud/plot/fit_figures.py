@@ -13,9 +13,7 @@ from thud.plot.style import (
     COLORS,
     FORCE_NAMES,
     GRAY,
-    WIDTH,
     curve_style,
-    empty_axes,
     legend_above,
     level_label,
     new_figure,
@@ -46,12 +44,15 @@ BEFORE, AFTER = 0.15, 0.4
 
 @own_style()
 def draw_fit(fit: Fit) -> dict[str, Figure]:
-    """Draw ``"fit"``, or ``"fit_1"`` and so on, and for several parameters ``"confidence"``."""
+    """Draw ``"fit"``, or ``"fit_1"`` and so on, and ``"confidence"`` of two to five parameters.
+
+    Parameters that are not identifiable have no regions.
+    """
     figures = {
         f"fit{end}": target_and_fit(fit, number)
         for number, end in enumerate(file_ends(len(fit.targets)), start=1)
     }
-    if len(fit.names) > 1:
+    if 1 < len(fit.names) <= MAX_PARAMETERS and np.isfinite(np.diag(fit.covariance)).all():
         figures["confidence"] = confidence(fit)
     return figures
 
@@ -135,7 +136,7 @@ def _draw_levels(fitted: FittedTarget, scale: float, above: Axes, below: Axes) -
     legend_above(above)
 
 
-# Maximum number of parameters with confidence regions; more have a table of correlations.
+# Maximum number of parameters with confidence regions.
 MAX_PARAMETERS = 5
 # Ratio of the half axis of a region to its center below which ticks have an offset.
 MIN_RATIO = 1e-3
@@ -145,14 +146,8 @@ MAX_CHARACTERS = 44
 
 @own_style()
 def confidence(fit: Fit) -> Figure:
-    """Draw joint confidence regions of two or more parameters, or their correlations.
-
-    There is one panel for each pair; more than five parameters have a table of correlations.
-    """
+    """Draw joint confidence regions of two to five parameters: one panel for each pair."""
     count = len(fit.names)
-    known = np.isfinite(np.diag(fit.covariance)).all()
-    if count > MAX_PARAMETERS or not known:
-        return _draw_correlation(fit)
     side = max(2.6, 0.95 * count + 0.6) if count > 2 else 2.6  # noqa: PLR2004 - a single pair
     figure = new_figure(side)
     panels = figure.subplots(count - 1, count - 1, sharex="col", sharey="row", squeeze=False)
@@ -232,25 +227,6 @@ def _add_ellipse(
         linewidth=1.2,
         label=label,
     )
-
-
-def _draw_correlation(fit: Fit) -> Figure:
-    figure, axes = empty_axes(WIDTH)
-    shown = np.ma.masked_invalid(fit.correlation)
-    axes.set_facecolor(GRAY)
-    axes.imshow(shown, cmap="RdBu_r", vmin=-1, vmax=1)
-    names = [name.replace("_", "\n") for name in fit.names]
-    axes.set_xticks(range(len(names)), names, fontsize="small", rotation=90)
-    axes.set_yticks(range(len(names)), names, fontsize="small")
-    for (row, column), value in np.ndenumerate(fit.correlation):
-        text = f"{value:z.2f}".replace("-", "−") if np.isfinite(value) else "not\nknown"
-        dark = np.isfinite(value) and abs(value) > 0.6  # noqa: PLR2004 - colors
-        axes.text(
-            column, row, text, ha="center", va="center", fontsize="small",
-            color="white" if dark else "black",
-        )  # fmt: skip
-    axes.set_title("Correlation")
-    return figure
 
 
 def _label(name: str, unit: str, letters: float) -> str:

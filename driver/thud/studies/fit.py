@@ -129,19 +129,15 @@ def fit(  # noqa: PLR0913 - options of a search
     }
     _require_options(options)
     bound = bound_parameters(case, parameters)
-    terms = _terms(case, _targets(target), bound)
-    result = _search(terms, get_ranges(case, bound), options, progress=progress)
-    for note in result.warnings:
-        warnings.warn(FitWarning(note), stacklevel=3)
-    return result
-
-
-def _targets(target: Any) -> tuple[Target, ...]:  # noqa: ANN401 - checked here
     if not isinstance(target, list):
         target = [target if isinstance(target, Target) else ForceTarget(target)]
     elif not target or not all(isinstance(entry, Target) for entry in target):
         refuse("target is a list with other entries than targets", "ForceTarget and LevelTarget")
-    return tuple(target)
+    terms = _terms(case, target, bound)
+    result = _search(terms, get_ranges(case, bound), options, progress=progress)
+    for note in result.warnings:
+        warnings.warn(FitWarning(note), stacklevel=3)
+    return result
 
 
 def _terms(case: Case, targets: Sequence[Target], parameters: Sequence[Parameter]) -> list[Term]:
@@ -151,7 +147,7 @@ def _terms(case: Case, targets: Sequence[Target], parameters: Sequence[Parameter
     own, row = len(names), 0
     for number, target in enumerate(targets, start=1):
         label = "target" if len(targets) == 1 else f"target {number}"
-        target_case = _with_fixed(case, target.fixed, names, label)
+        target_case = _with_fixed(case, target.fixed, names, label) if target.fixed else case
         try:
             if target.fixed:
                 check_case(replace(target_case, modes=None))
@@ -172,8 +168,6 @@ def _with_fixed(
 ) -> Case:
     """Return the case of a target with its fixed keys."""
     require_kind(f"{label}: fixed", fixed, Mapping)
-    if not fixed:
-        return case
     if wrong := [name for name in fixed if name in fitted or name == "model"]:
         refuse(
             f"{label}: fixed {wrong[0]} is not allowed",
@@ -186,29 +180,25 @@ def _with_fixed(
 def _search(
     terms: list[Term], ranges: list[Range], options: Mapping[str, Any], *, progress: bool
 ) -> Fit:
-    start = {entry.name: entry.start for entry in ranges}
-    terms = [term._replace(case=_with_mesh(term.case, start)) for term in terms]
+    for i, term in enumerate(terms):
+        model = term.case.model
+        if isinstance(model, FiniteElement) and not (model.radial_elements or model.polar_elements):
+            terms[i] = term._replace(case=_with_mesh(term.case, ranges))
     return search(terms, ranges, options, progress=progress)
 
 
-def _with_mesh(case: Case, start: Mapping[str, float]) -> Case:
+def _with_mesh(case: Case, ranges: list[Range]) -> Case:
     """Return a case whose automatic finite elements are those of the start of a search.
 
     The elements would change between points of the search, and with them a level by up to 0.2 dB.
     """
-    model = case.model
-    if not isinstance(model, FiniteElement) or model.radial_elements or model.polar_elements:
-        return case
     try:
-        quantities = compute(with_values(case, start)).model_quantities
+        start = with_values(case, {entry.name: entry.start for entry in ranges})
+        quantities = compute(start).model_quantities
     except ThudError:
         return case  # The search reports it.
-    mesh = replace(
-        model,
-        radial_elements=round(quantities["radial_elements"]),
-        polar_elements=round(quantities["polar_elements"]),
-    )
-    return replace(case, model=mesh)
+    numbers = {name: round(quantities[name]) for name in ("radial_elements", "polar_elements")}
+    return with_values(case, numbers)
 
 
 def _require_options(options: Mapping[str, Any]) -> None:

@@ -71,6 +71,10 @@ class Comparison(Immutable, ABC):
     def residual(self, impact: Impact, own: Array) -> Array:
         """Return model minus target over standard deviation, shape (size,)."""
 
+    def excess(self, impact: Impact, own: Array, residual: Array) -> float:  # noqa: ARG002
+        """Return by how much residuals exceed noise of unit variance; at least 1."""
+        return max(1.0, float(np.sqrt(np.mean(residual**2))))
+
     @abstractmethod
     def columns(self, impact: Impact, own: Array) -> Mapping[str, Sequence[object] | Array]:
         """Return target and model side by side, SI units, dB: columns by their names."""

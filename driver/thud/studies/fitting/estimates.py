@@ -92,7 +92,10 @@ class Estimates(Displayed):
     @property
     def correlation(self) -> Array:
         """Correlation of the parameters, shape (n, n); NaN where a variance is infinite."""
-        return correlation_of(self.covariance)
+        errors = np.sqrt(np.diag(self.covariance))
+        with np.errstate(invalid="ignore"):
+            result: Array = self.covariance / np.outer(errors, errors)
+        return result
 
     @property
     def notes(self) -> tuple[Note, ...]:
@@ -185,11 +188,3 @@ class Estimates(Displayed):
         """
         contents = self.files() | (self.figure_files() if figures else {})
         return Results(Path(directory), "fit", replace=replace).write(contents)
-
-
-def correlation_of(covariance: Array) -> Array:
-    """Return the correlation of a covariance, shape (n, n); NaN where a variance is infinite."""
-    errors = np.sqrt(np.diag(covariance))
-    with np.errstate(invalid="ignore"):
-        result: Array = covariance / np.outer(errors, errors)
-    return result

@@ -12,7 +12,6 @@ from tqdm import tqdm
 from thud.base.errors import NumericalError
 from thud.base.note import Note, of_part
 from thud.base.units import display_unit
-from thud.studies.fitting.estimates import correlation_of
 from thud.studies.fitting.fit_result import Fit, FittedTarget
 from thud.studies.fitting.force_target import GAIN, ForceComparison
 from thud.studies.fitting.inference import (
@@ -21,7 +20,6 @@ from thud.studies.fitting.inference import (
     coverage_factor,
     direction_note,
     infer,
-    pair_notes,
     posterior,
     worst_directions,
 )
@@ -166,7 +164,7 @@ def _identifiability_notes(point: _Point, count: int, confidence: float) -> list
     result = [direction_note(names, direction) for direction in null]
     for deviation, direction in wide:
         result.append(direction_note(names[:count], direction, factor * deviation, confidence))
-    return result or pair_notes(names, correlation_of(noise))
+    return result
 
 
 def _at_limits(objective: Objective, x: Array) -> list[Note]:
@@ -194,14 +192,14 @@ def _residual_warnings(point: _Point, wrong: Posterior) -> tuple[list[Note], flo
         comparison, impact, own = term.comparison, target.impact, target.own
         residual, rest = point.residual[term.rows], unexplained[term.rows]
         freedom = comparison.size - comparison.absorbed - len(point.names) / len(point.targets)
-        notes, excess = [], max(1.0, float(np.sqrt(np.mean(rest**2))))
+        notes = []
         if comparison.known_noise and freedom > 0:
             notes = size_warning(residual, freedom, comparison.noise_freedom)
         if isinstance(comparison, ForceComparison):
             unit = point.deviation * comparison.unit_deviation
             notes += comparison.warnings(impact, own, residual, unit, len(point.names))
-            excess = comparison.excess(impact, own, rest)
         if notes:
+            excess = comparison.excess(impact, own, rest)
             ratio = max(ratio, excess * float(np.sqrt(comparison.size / max(freedom, 1.0))))
         result += of_part(f"target {number}", notes) if len(point.targets) > 1 else notes
     return result, ratio

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.signal import zoom_fft
 
-from thud.base.checks import refuse, refuse_value, require_choice, require_number, require_whole
+from thud.base.checks import refuse, refuse_value, require_choice, require_whole
 from thud.base.immutable import Immutable
 from thud.base.note import Note
 from thud.impact.impact import Impact
@@ -19,11 +19,9 @@ from thud.studies.fitting.comparison import Comparison, require_positive
 from thud.studies.fitting.force_record import Record, read_record
 from thud.studies.fitting.record_noise import (
     MIN_BACKGROUND,
-    MIN_HUM,
     Weights,
     find_pulse,
     find_quiet,
-    hum_harmonics,
     new_weights,
     trimmed,
     wave_size,
@@ -68,8 +66,9 @@ class ForceTarget(Immutable):
     Model and record are compared at the frequencies up to `below`, by their discrete Fourier
     transforms over the time of the record, in which a shift in time is a phase. Above it there is
     noise, or numerical ripple. The residuals are weighted by the covariance of the noise (white,
-    pink and brown), estimated from the background before and after the pulse (generalized least
-    squares); offset and hum are nuisance parameters. Only 0.1 s of background on each side counts.
+    pink, brown, and hum of 50 and 60 Hz), estimated from the background before and after the pulse
+    (generalized least squares); offset and tones are nuisance parameters. Only 0.1 s of background
+    on each side counts.
 
     Attributes
     ----------
@@ -93,9 +92,6 @@ class ForceTarget(Immutable):
         Number of the drop of a recording that has several, from 1.
     offset : bool or None
         An offset is a nuisance parameter; None: where there is enough background.
-    hum : float or None
-        Frequency, Hz, of hum whose first five harmonics are nuisance parameters; 0: no hum; None:
-        hum of 50 or 60 Hz and other tones as found in the background.
     gain : float or None
         Relative standard uncertainty of the calibration: a factor of the record is fitted, which is
         1 within this uncertainty; infinite: any factor; None: the factor is 1.
@@ -111,7 +107,6 @@ class ForceTarget(Immutable):
     window: tuple[float, float] | None = None
     drop: int = 1
     offset: bool | None = None
-    hum: float | None = None
     gain: float | None = None
     fixed: Mapping[str, object] = field(default_factory=dict)
 
@@ -150,11 +145,6 @@ class ForceTarget(Immutable):
         require_positive("below", self.below, "Hz")
         count = len(self.record.drops) if isinstance(self.record, Recording) else 1
         require_whole("target: drop", self.drop, 1, count)
-        if self.hum is not None:
-            require_number("target: hum", self.hum)
-            if self.hum and not MIN_HUM <= self.hum <= self.below:
-                allowed = f"0, or {MIN_HUM:g} to {self.below:g} Hz"
-                refuse_value("target: hum", self.hum, allowed)
         for name in ("time_shift", "offset"):
             value = getattr(self, name)
             if value is not None and not isinstance(value, bool):
@@ -353,10 +343,8 @@ class ForceComparison(Comparison):
 
     def _phases(self, impact: Impact, own: Array) -> list[NDArray[np.bool_]]:
         """Return which residuals lie before, in and after the contact."""
-        time, _, rate = self.record
-        grid = time[0] + np.arange(len(self.weights.matrix)) * (len(time) / rate) / len(
-            self.weights.matrix
-        )
+        count = len(self.weights.matrix)
+        grid = self.record.time[0] + np.arange(count) * self._period / count
         begin = self.own_value(SHIFT, own)
         before, after = grid < begin, grid > begin + impact.contact_time
         return [before, ~(before | after), after]
@@ -368,17 +356,15 @@ def compare_force(target: ForceTarget, record: Record, pulse: tuple[int, int]) -
     count = int(target.below * (len(time) / rate) * (1 + ROUNDING)) + 1
     spectrum = np.fft.rfft(force, norm="ortho")[:count]
     quiet = find_quiet(force, rate, pulse, target.below)
-    shown = quiet.known and quiet.deviation > NUMERICAL * force.max()
-    offset = quiet.known if target.offset is None else target.offset
-    if target.hum is not None:
-        tones = hum_harmonics(target.hum, target.below)
-    else:
-        tones = quiet.tones() if shown else ()
+    known = quiet.freedom >= MIN_BACKGROUND
+    shown = known and quiet.deviation > NUMERICAL * force.max()
+    offset = known if target.offset is None else target.offset
+    tones = quiet.tones() if shown else ()
     background = quiet.background(tones) if shown else None
+    at = np.arange(len(time)) / rate - quiet.middle
     weights = new_weights(
-        np.arange(len(time)) / rate - quiet.middle, rate, 2 * count - 1,
+        at, rate, 2 * count - 1,
         background=background, noise=target.noise, offset=offset, tones=tones,
-        mains=target.hum is None,
     )  # fmt: skip
     known_noise = shown or target.noise is not None
     exact = isinstance(source, Impact)
@@ -402,7 +388,7 @@ def compare_force(target: ForceTarget, record: Record, pulse: tuple[int, int]) -
         absorbed=offset + 2 * len(tones), own={name: SCALES[name] for name in names},
         record=record, kind=target.force or assessed, below=target.below, spectrum=spectrum,
         weights=weights, prior=prior, background=background, offset=offset, tones=tones,
-        short=quiet.seconds if not (quiet.known or target.offset is not None or exact) else np.nan,
+        short=quiet.seconds if not (known or target.offset is not None or exact) else np.nan,
     )  # fmt: skip
 
 

@@ -28,9 +28,6 @@ MIN_RATIO = 1e-6
 ERRORS = 3.0
 # Entries of a unit vector below this are zero.
 NEGLIGIBLE = 1e-3
-# Correlation above which two parameters cannot be separated in practice: errors of the model exceed
-# the difference of their effects.
-INSEPARABLE = 0.998
 # Fraction of the maximum entry below which a message omits a parameter.
 SMALL = 0.05
 
@@ -175,20 +172,6 @@ def direction_note(
     code = "hardly_identifiable" if len(entries) > 1 else "hardly_known"
     size = 100 * width * largest
     return Note(code, value=float(size), unit="%", others={**others, "confidence": confidence})
-
-
-def pair_notes(names: Sequence[str], correlation: Array) -> list[Note]:
-    """Return notes on pairs that cannot be separated, the strongest correlation first."""
-    strong = np.triu(np.nan_to_num(np.abs(correlation)), 1)
-    pairs = sorted(np.argwhere(strong >= INSEPARABLE).tolist(), key=lambda pair: -strong[*pair])
-    result = []
-    for i, j in pairs:
-        # 1.00 would hide a difference.
-        digits = int(np.clip(np.ceil(-np.log10(max(1 - strong[i, j], 1e-9))), 2, 9))
-        shown = f"{correlation[i, j]:.{digits}f}".replace("-", "−")
-        others = {"first": names[i], "second": names[j], "shown": shown}
-        result.append(Note("inseparable", value=float(correlation[i, j]), others=others))
-    return result
 
 
 def _join(words: Sequence[str]) -> str:

@@ -15,6 +15,8 @@ from thud.case.keys import limits, with_values
 from thud.studies.parameter import read_fitted
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from thud.base.key import Key
     from thud.case.case import Case
     from thud.studies.parameter import Parameter
@@ -93,17 +95,16 @@ def bound_parameters(
     return tuple(fitted_parameter(name, entry, case) for name, entry in parameters.items())
 
 
-def get_ranges(case: Case, parameters: Iterable[Parameter]) -> list[Range]:
+def get_ranges(case: Case, parameters: Sequence[Parameter]) -> list[Range]:
     """Return ranges of parameters; raise InputError if a start is outside its limits."""
-    result = list(parameters)
     # Limits that are other keys take their values at the start.
-    begin = with_values(case, {p.name: p.start for p in result if p.start is not None})
-    return [_get_range(begin, parameter) for parameter in result]
+    begin = with_values(case, {p.name: p.start for p in parameters if p.start is not None})
+    starts = known_parameters(begin)
+    return [_get_range(begin, p, float(starts[p.name][1])) for p in parameters]
 
 
-def _get_range(case: Case, parameter: Parameter) -> Range:
+def _get_range(case: Case, parameter: Parameter, start: float) -> Range:
     name, key = parameter.name, parameter.key
-    start = float(known_parameters(case)[name][1])
     lower, upper = limits(key, case)
     scale = abs(start) or ((parameter.high or upper) - (parameter.low or lower)) / 10
     low = lower if parameter.low is None else parameter.low

@@ -30,7 +30,7 @@ _LEVEL_KEYS = (
     *SAMPLE_QUANTITIES,
 )
 _UNITS = {
-    "noise": "N", "below": "Hz", "window": "s", "frequencies": "Hz", "hum": "Hz", "gain": "",
+    "noise": "N", "below": "Hz", "window": "s", "frequencies": "Hz", "gain": "",
 }  # fmt: skip
 
 Target: TypeAlias = ForceTarget | LevelTarget

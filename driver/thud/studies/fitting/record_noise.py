@@ -16,7 +16,6 @@ from thud.base.immutable import freeze
 from thud.recordings.background import (
     DRIFT,
     MAINS,
-    N_HARMONIC,
     Background,
     cell_means,
     fit_noise,
@@ -100,6 +99,8 @@ class Quiet:
         Maximum of the record − its median, N.
     seconds, middle : float
         Length of the background, and middle of the pulse from the first sample, s.
+    freedom : int
+        Number of independent values in the band − 1 for the offset.
     deviation : float
         Standard deviation of the background, N.
     below : float
@@ -111,18 +112,9 @@ class Quiet:
     peak: float
     seconds: float
     middle: float
+    freedom: int
     deviation: float
     below: float
-
-    @property
-    def freedom(self) -> int:
-        """Number of independent values in the band − 1 for the offset."""
-        return int(2 * self.below * self.seconds) - 1
-
-    @property
-    def known(self) -> bool:
-        """Whether there is enough of it to determine the noise."""
-        return self.freedom >= MIN_BACKGROUND
 
     def background(self, tones: Sequence[float] = ()) -> Background:
         """Return the most likely noise: white, pink, brown and hum of 50 and 60 Hz.
@@ -176,11 +168,13 @@ def find_quiet(force: Array, rate: float, pulse: tuple[int, int], below: float) 
     after = stop + width * np.arange(1 + counts[1])
     (begin, end), mean = cell_means(force, rate, before, after)
     middle = (first + stop) / 2 / rate
+    seconds = sum(min(side / rate, MAX_BACKGROUND) for side in sides)
     return Quiet(
         (begin - middle, end - middle),
         mean - np.median(mean) if len(mean) else mean,
         peak=float(force.max() - np.median(force)),
-        seconds=sum(min(side / rate, MAX_BACKGROUND) for side in sides),
+        seconds=seconds,
+        freedom=int(2 * below * seconds) - 1,
         middle=middle,
         deviation=float(np.std(np.concatenate([force[:first], force[stop:]]))) if any(sides) else 0,
         below=below,
@@ -284,12 +278,6 @@ class Weights:
         return result
 
 
-def hum_harmonics(hum: float, below: float) -> tuple[float, ...]:
-    """Return the frequencies of hum and its harmonics, Hz, that lie below another one; 0: none."""
-    count = min(N_HARMONIC, int(HARMONIC_EDGE * below / hum)) if hum else 0
-    return tuple(hum * order for order in range(1, 1 + count))
-
-
 def new_weights(  # noqa: PLR0913 - components of the noise
     time: Array,
     rate: float,
@@ -299,14 +287,12 @@ def new_weights(  # noqa: PLR0913 - components of the noise
     noise: float | None,
     offset: bool,
     tones: Sequence[float],
-    mains: bool,
 ) -> Weights:
     """Return the weights of a record at times, s from the middle of the pulse, on a grid.
 
     The grid has `count` points. `noise` is the standard deviation of white noise, N, instead of the
     noise of the background; if neither is known, it is 1 N. Waves of the `tones`, Hz, and an
-    `offset` are nuisance parameters; with `mains`, hum of 50 and 60 Hz is included as found in the
-    background.
+    `offset` are nuisance parameters; hum of 50 and 60 Hz is that of the background.
     """
     n = len(time)
     white, colored, humming = (noise or 1.0) ** 2, np.zeros(n), np.zeros(n)
@@ -318,8 +304,7 @@ def new_weights(  # noqa: PLR0913 - components of the noise
         if noise is None:
             white = variances[0] * rate / 2
             colored = variances[1:3] @ rows[:2]
-        if mains:
-            humming = variances[3:] @ rows[2:4]
+        humming = variances[3:] @ rows[2:4]
         drift = DRIFT * background.peak if offset else 0.0
     slope = to_grid(drift * time[:, np.newaxis], count)
     predicted = grid_covariance(humming, count) + slope @ slope.T
