@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import thud
 from thud.plot import plate_modes
 from thud.plot.fit_figures import confidence
-from thud.studies.kinds import get_kind
+from thud.studies.fit import run_fit
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -27,8 +27,8 @@ EXAMPLE = REPOSITORY / "docs/examples/plate_scikit_fem.py"
 @cache
 def study(kind: str, name: str) -> Any:  # noqa: ANN401 - of any kind
     """Return the result of a study."""
-    chosen = get_kind(kind)
-    return chosen.compute(chosen.read_study(STUDIES / f"{name}.toml"), None)
+    run = run_fit if kind == "fit" else getattr(thud, kind)
+    return run(STUDIES / f"{name}.toml")
 
 
 @cache

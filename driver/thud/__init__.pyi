@@ -117,13 +117,15 @@ from .studies.fit import fit as fit
 from .studies.fitting.fit_result import Fit as Fit
 from .studies.fitting.force_target import ForceTarget as ForceTarget
 from .studies.fitting.level_target import LevelTarget as LevelTarget
-from .studies.kinds import read_study as read_study
 from .studies.parameter import Parameter as Parameter
 from .studies.sensitivity import (
     Sensitivity as Sensitivity,
     sensitivity as sensitivity,
 )
-from .studies.study import Study as Study
+from .studies.study import (
+    Study as Study,
+    read_study as read_study,
+)
 from .studies.surrogate import surrogate as surrogate
 from .studies.sweep import (
     Sweep as Sweep,

@@ -18,13 +18,11 @@ from conftest import naming
 from distributed import Client, LocalCluster
 
 import thud
-from thud.studies.backends import dask_executor, run_blocks
-from thud.studies.blocks import Blocks
-from thud.studies.samples import Block, evaluate
-from thud.studies.sweep import KIND
+from thud.studies import run
+from thud.studies.run import dask_executor, evaluate
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
     from pathlib import Path
 
     import xarray as xr
@@ -46,7 +44,6 @@ MODAL: dict[str, Any] = {
     "fixed": {"model": "modal_ball", "rings": 20},
     "parameters": {"height": {"low": 0.9, "high": 1.1}},
 }
-BLOCKS = 12
 # A scheduler and a worker in one process, which can be killed.
 DOOMED = """
 from distributed import LocalCluster
@@ -84,7 +81,7 @@ def test_every_executor_gives_the_same(
     cluster: LocalCluster, expected: xr.Dataset, tmp_path: Path
 ) -> None:
     assert set(expected["status"].values) == {0, 1, 2}
-    assert expected.sizes["sample"] > KIND.read_study(STUDY).block_size
+    assert expected.sizes["sample"] > thud.read_study(STUDY).block_size
     spawn = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(2, spawn) as processes, Client(cluster) as client:
         for executor in (None, processes, client.get_executor()):
@@ -95,61 +92,38 @@ def test_every_executor_gives_the_same(
 
 
 def test_threads_of_a_block_do_not_matter() -> None:
-    block = Block(0, thud.Case(), {"height": np.linspace(0, 60, 200)}, thud.__version__)
-    one, more = evaluate(block), thud.solve_many(block.columns, block.case, threads=3)
+    columns = {"height": np.linspace(0, 60, 200)}
+    one = evaluate(thud.Case(), columns, thud.__version__)
+    more = thud.solve_many(columns, thud.Case(), threads=3)
     for name in ("peak_force", "margin", "status", "reason"):
         np.testing.assert_array_equal(one[name], getattr(more, name))
 
 
-def modal_blocks() -> list[Block]:
-    """Return blocks that take long enough to lose their worker."""
-    study = thud.read_study({"parameters": {"height": {"low": 1, "high": 2, "count": 20}}})
-    case = thud.Case(model=thud.ModalBall())
-    return [
-        Block(20 * i, case, study.parameter_columns(0, 20), thud.__version__) for i in range(BLOCKS)
-    ]
+def kill_at_first_block(monkeypatch: pytest.MonkeyPatch, kill: Callable[[], None]) -> None:
+    """Kill workers as soon as the first block is to be written."""
+    write = run.write_dataset
+
+    def kill_and_write(*block: Any) -> None:  # noqa: ANN401 - dataset and path
+        monkeypatch.setattr(run, "write_dataset", write)
+        kill()
+        write(*block)
+
+    monkeypatch.setattr(run, "write_dataset", kill_and_write)
 
 
 @pytest.mark.slow
-def test_killed_worker_of_dask_loses_nothing(cluster: LocalCluster) -> None:
-    blocks = modal_blocks()
-    with Client(cluster) as client:
-        pids = list(client.run(os.getpid).values())
-    kept: dict[int, dict[str, Any]] = {}
-
-    def keep(block: Block, found: dict[str, Any]) -> None:
-        if not kept:
-            os.kill(pids[0], signal.SIGKILL)
-        kept[block.start] = found
-
-    with dask_executor(cluster.scheduler_address) as executor:
-        run_blocks(blocks, keep, executor=executor)
-    expected = evaluate(blocks[0])
-    assert sorted(kept) == [block.start for block in blocks]
-    for found in kept.values():
-        for name, values in expected.items():
-            np.testing.assert_array_equal(found[name], values)
-
-
-@pytest.mark.slow
-def test_killed_worker_of_dask_leaves_no_gap_on_disk(
-    cluster: LocalCluster, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_killed_worker_of_dask_loses_nothing(
+    cluster: LocalCluster,
+    expected_modal: xr.Dataset,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    study = {**STUDY, "fixed": MODAL["fixed"], "design": {**STUDY["design"], "size": 400}}
     with Client(cluster, set_as_default=False) as client:
         pids = list(client.run(os.getpid).values())
-    keep = Blocks.keep
-
-    def kill_and_keep(store: Blocks, block: Block, found: dict[str, Any]) -> None:
-        if pids:
-            os.kill(pids.pop(), signal.SIGKILL)
-            pids.clear()
-        keep(store, block, found)
-
-    monkeypatch.setattr(Blocks, "keep", kill_and_keep)
+    kill_at_first_block(monkeypatch, lambda: os.kill(pids[0], signal.SIGKILL))
     with dask_executor(cluster.scheduler_address) as executor:
-        found = thud.sweep(study, tmp_path, executor=executor).dataset
-    assert found.drop_attrs(deep=False).identical(thud.sweep(study).dataset.drop_attrs(deep=False))
+        found = thud.sweep(MODAL, tmp_path, executor=executor).dataset
+    assert found.drop_attrs(deep=False).identical(expected_modal)
 
 
 @pytest.mark.slow
@@ -186,7 +160,7 @@ def test_lost_scheduler_is_reported_and_its_study_goes_on_elsewhere(
 def test_unreachable_scheduler_is_reported_soon(
     tmp_path: Path, errors_of: ErrorsOf, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("thud.studies.backends.SCHEDULER_TIMEOUT", 1)
+    monkeypatch.setattr("thud.studies.run.SCHEDULER_TIMEOUT", 1)
     path = tmp_path / "study.toml"
     path.write_text("parameters.height.values = [1]")
     for address in ("tcp://127.0.0.1:9", "nonsense://"):
@@ -197,7 +171,7 @@ def test_unreachable_scheduler_is_reported_soon(
 
 
 def test_scheduler_without_workers_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("thud.studies.backends.SCHEDULER_TIMEOUT", 1)
+    monkeypatch.setattr("thud.studies.run.SCHEDULER_TIMEOUT", 1)
     with (
         LocalCluster(n_workers=0, processes=False, dashboard_address=":0") as empty,
         pytest.raises(thud.InputError, match=naming("scheduler", "worker", "1 s")),
@@ -207,9 +181,8 @@ def test_scheduler_without_workers_is_reported(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_other_version_is_reported() -> None:
-    block = Block(0, thud.Case(), {"height": np.ones(1)}, "0.0.1")
     with pytest.raises(thud.InputError, match=naming("version", "0.0.1", thud.__version__)):
-        evaluate(block)
+        evaluate(thud.Case(), {"height": np.ones(1)}, "0.0.1")
 
 
 @pytest.mark.parametrize("workers", [0, 2000])
@@ -223,17 +196,23 @@ def test_useless_numbers_of_workers_are_reported(workers: int) -> None:
         thud.sweep(STUDY, workers=2, executor=executor)
 
 
-def test_lost_process_is_reported_and_finished_blocks_are_kept() -> None:
-    kept = []
+def test_lost_process_is_reported_and_finished_blocks_are_kept(
+    expected_modal: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     spawn = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(2, spawn) as processes:
-        others = set(multiprocessing.active_children())
+    others = set(multiprocessing.active_children())
 
-        def keep(block: Block, _: dict[str, Any]) -> None:
-            kept.append(block.start)
-            for child in set(multiprocessing.active_children()) - others:
-                child.kill()
+    def kill() -> None:
+        for child in set(multiprocessing.active_children()) - others:
+            child.kill()
 
-        with pytest.raises(thud.NumericalError, match=naming("executor", "run the study again")):
-            run_blocks(modal_blocks(), keep, executor=processes)
-    assert kept
+    kill_at_first_block(monkeypatch, kill)
+    with (
+        ProcessPoolExecutor(2, spawn) as processes,
+        pytest.raises(thud.NumericalError, match=naming("executor", "run the study again")),
+    ):
+        thud.sweep(MODAL, tmp_path, executor=processes)
+    finished = thud.read_sweep(tmp_path / "python.partial").dataset.sizes["sample"]
+    assert 0 < finished < MODAL["design"]["size"]
+    found = thud.sweep(MODAL, tmp_path).dataset
+    assert found.drop_attrs(deep=False).identical(expected_modal)

@@ -62,17 +62,19 @@ def test_map_holds_the_verdicts_of_single_drops() -> None:
     assert (result.dataset["margin"].values.ravel() >= 0).tolist() == verdicts
 
 
-def test_standard_ball_is_marked() -> None:
+def test_case_is_marked() -> None:
     result = thud.design(MODAL)
-    assert (result.mark, result.mark_name) == ((0.032, 1.56e6), "standard ball")
+    assert result.mark == (0.032, 1.56e6)
     figure = thud.plot.draw_design(result)
     axes, bar = figure.axes
     (star,) = [line for line in axes.lines if line.get_marker() == "*"]
+    # Whole on an edge of the map.
+    assert not star.get_clip_on()
     assert (star.get_xdata()[0], star.get_ydata()[0]) == pytest.approx((32, 1.56))
     assert axes.get_xlabel() == "Wall thickness, mm"
     assert axes.get_ylabel() == "Young's modulus, MPa"
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
-    assert labels == ["Octave limits", "All criteria met", "Standard ball"]
+    assert labels == ["Octave limits", "All criteria met", "Case"]
     assert bar.get_ylabel() == "Margin (force on the floor), dB"
 
 
@@ -125,54 +127,6 @@ def test_map_of_nearly_one_margin_is_drawn() -> None:
     study = {"parameters": {"height": heights, "mass": {"values": [2.0, 2.0001]}}}
     axes, _ = thud.plot.draw_design(thud.design(study)).axes
     assert not axes.texts
-
-
-def test_star_on_the_edge_is_whole() -> None:
-    axes, _ = thud.plot.draw_design(thud.design(MODAL)).axes
-    (star,) = [line for line in axes.lines if line.get_marker() == "*"]
-    assert not star.get_clip_on()
-
-
-def test_base_case_is_marked_where_the_standard_ball_has_no_value() -> None:
-    study = {
-        "fixed": {"model": "modal_ball"},
-        "parameters": {"loss_factor": {"values": [0.2, 0.4]}, "height": {"values": [2.0, 1.5]}},
-    }
-    result = thud.design(study)
-    assert (result.mark, result.mark_name) == (None, "case")
-    axes, _ = thud.plot.draw_design(result).axes
-    assert axes.get_legend() is None
-    study["parameters"]["height"] = {"values": [1.0, 1.5]}
-    assert thud.design(study).mark == (0.31, 1.0)
-
-
-def test_ball_is_the_standard_one_only_if_all_of_it_is() -> None:
-    axes: dict[str, Any] = {"mass": {"values": [2, 3]}, "height": {"values": [0.5, 1.5]}}
-    result = thud.design({"parameters": axes})
-    assert (result.mark, result.mark_name) == ((2.5, 1.0), "standard ball")
-    # The values of the case for what is varied do not count.
-    result = thud.design({"case": {"drop": {"height": 1.4}}, "parameters": axes})
-    assert (result.mark, result.mark_name) == ((2.5, 1.0), "standard ball")
-    for fixed in ({"outer_radius": 0.07}, {"gravity": 1.6}):
-        result = thud.design({"fixed": fixed, "parameters": axes})
-        assert (result.mark, result.mark_name) == ((2.5, 1.0), "case")
-
-
-def test_density_of_the_standard_ball_is_marked() -> None:
-    density = 2.5 / (4 / 3 * np.pi * (0.089**3 - 0.057**3))
-    height: dict[str, Any] = {"height": {"values": [0.5, 1.5]}}
-    axes = {"density": {"values": [1000, 1200]}, **height}
-    result = thud.design({"parameters": axes})
-    assert (result.mark, result.mark_name) == (pytest.approx((density, 1.0)), "standard ball")
-    result = thud.design({"fixed": {"outer_radius": 0.088}, "parameters": axes})
-    heavier = 2.5 / (4 / 3 * np.pi * (0.088**3 - 0.056**3))
-    assert (result.mark, result.mark_name) == (pytest.approx((heavier, 1.0)), "case")
-    with pytest.raises(thud.InputError, match=naming("[fixed]", "&ball: outer_radius", 0.0)):
-        thud.design({"fixed": {"outer_radius": 0}, "parameters": axes})
-    axes = {"wall_thickness": {"values": [0.03, 0.034]}, **height}
-    for given, name in ((density, "standard ball"), (1000, "case")):
-        result = thud.design({"fixed": {"density": given}, "parameters": axes})
-        assert (result.mark, result.mark_name) == ((0.032, 1.0), name)
 
 
 def test_places_without_results_stay_empty() -> None:
@@ -279,9 +233,10 @@ def test_map_rounds_the_rating_as_the_verdict_does(
     found = room_design.room_rating
     assert found is not None
     rating = found + lowest - float(found.min()) + 1e-9
-    dataset = room_design.dataset.assign(room_rating=rating)
-    shifted = replace(room_design, dataset=dataset, required=49.0)
-    assert dict(shifted.rows())["rating at most 49 dB"] == f"{count} of {found.size}"
+    attrs = room_design.dataset.attrs
+    case = attrs["case"].replace("required = 0.0", "required = 49.0")
+    shifted = room_design.dataset.assign(room_rating=rating).assign_attrs(case=case)
+    assert dict(thud.Design(shifted).rows())["rating at most 49 dB"] == f"{count} of {found.size}"
 
 
 def test_design_of_one_parameter_is_a_curve() -> None:

@@ -10,29 +10,21 @@ import signal
 import subprocess
 import sys
 import time
-from types import SimpleNamespace
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY, names_in, naming
+from conftest import names_in, naming
 
 import thud
 from thud import cli
-from thud.studies import samples
-from thud.studies.blocks import Blocks
-from thud.studies.dataset import disk_space
-from thud.studies.sweep import KIND
-
-sys.path.insert(0, str(REPOSITORY / "tests/faults"))
+from thud.studies import run
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from pathlib import Path
 
     import xarray as xr
-
-    from thud.studies.samples import SampleStudy
 
 HEIGHTS = {"parameters": {"height": {"values": [50, 100], "unit": "cm"}}}
 # Several blocks of the modal ball, some seconds.
@@ -91,16 +83,13 @@ def test_ended_study_goes_on_where_it_stopped(
     assert values(finished).identical(values(whole.isel(sample=known)))
 
     computed = []
-    evaluate = samples.evaluate
+    evaluate = run.evaluate
 
-    def count(block: samples.Block) -> dict[str, Any]:
-        computed.append(len(block.columns["height"]))
-        return evaluate(block)
+    def count(case: thud.Case, columns: dict[str, Any], *more: Any) -> dict[str, Any]:  # noqa: ANN401
+        computed.append(len(columns["height"]))
+        return evaluate(case, columns, *more)
 
-    monkeypatch.setattr("thud.studies.backends.evaluate", count)
-    # What is finished needs no space again.
-    left = disk_space(thud.read_study(tmp_path / "long.toml")) - 1
-    monkeypatch.setattr("shutil.disk_usage", lambda _: SimpleNamespace(free=left))
+    monkeypatch.setattr(run, "evaluate", count)
     resumed = thud.sweep(tmp_path / "long.toml", tmp_path).dataset
     assert sum(computed) == 500 - finished.sizes["sample"]
     assert values(resumed).identical(values(whole))
@@ -117,7 +106,7 @@ def test_full_disk_is_reported_and_loses_nothing(
     (tmp_path / "long.toml").write_text(LONG)
     arguments = ["sweep", str(tmp_path / "long.toml"), "-q", "-o", str(tmp_path)]
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    size = KIND.read_study(tmp_path / "long.toml").block_size
+    size = thud.read_study(tmp_path / "long.toml").block_size
     blocks = -(-whole.sizes["sample"] // size)
     assert blocks > 1
     block, end = (
@@ -143,7 +132,7 @@ def test_results_of_another_study_are_not_touched(tmp_path: Path) -> None:
     thud.sweep({"name": "a", **HEIGHTS}, tmp_path)
     before = (tmp_path / "a.nc").read_bytes()
     other = {"name": "a", "parameters": {"height": {"values": [1]}}}
-    words = naming("a.nc", "[parameters] height", [50.0, 100.0], "cm", [1.0], "--replace")
+    words = naming("a.nc", "[parameters] height", "(0.5, 1.0)", "(1.0,)", "--replace")
     with pytest.raises(thud.InputError, match=words):
         thud.sweep(other, tmp_path)
     (tmp_path / "a.nc").rename(tmp_path / "b.nc")
@@ -154,28 +143,18 @@ def test_results_of_another_study_are_not_touched(tmp_path: Path) -> None:
     with pytest.raises(thud.InputError, match=naming("c.nc", "--replace")):
         thud.sweep({**other, "name": "c"}, tmp_path)
     (tmp_path / "d.partial").mkdir()
-    (tmp_path / "d.partial/study").write_text('{"thud": "0.0.1", "samples in a block": "9"}')
-    (tmp_path / "d.partial/block_000000000000.nc").write_text("of another study")
-    with pytest.raises(
-        thud.InputError,
-        match=naming("d.partial", "thud", "0.0.1", thud.__version__, "kind"),
-    ):
+    block = tmp_path / "d.partial/block_000000000000.nc"
+    block.write_bytes(before)
+    with pytest.raises(thud.InputError, match=naming("d.partial", "height", "--replace")):
         thud.sweep({**other, "name": "d"}, tmp_path)
-    assert len(list((tmp_path / "d.partial").iterdir())) == 2
+    assert block.read_bytes() == before
     (tmp_path / "e.partial").mkdir()
     # Kills leave half a file.
-    (tmp_path / "e.partial/.study.1.new").write_text("")
+    (tmp_path / "e.partial/.block_000000000000.nc.1.new").write_text("")
     with pytest.raises(thud.InputError, match=naming("e.partial", "samples")):
         thud.read_sweep(tmp_path / "e.partial")
     assert thud.sweep({**other, "name": "e"}, tmp_path).dataset.sizes["height"] == 1
-
-
-def keep_one_block(study: SampleStudy, folder: Path) -> None:
-    """Begin a study and finish its first set only."""
-    blocks = Blocks(folder, study, 1)
-    blocks.open()
-    block = samples.Block(0, study.case, {"height": np.array([0.5])}, thud.__version__)
-    blocks.keep(block, samples.evaluate(block))
+    assert not (tmp_path / "e.partial").exists()
 
 
 def test_replace_leaves_nothing_of_an_older_version(tmp_path: Path) -> None:
@@ -218,8 +197,11 @@ def test_links_in_the_place_of_results_are_not_followed(name: str, tmp_path: Pat
     assert list(other.iterdir()) == []
 
 
-@pytest.mark.parametrize("name", ["python.partial", "python.nc"])
-@pytest.mark.parametrize("content", ["paper.txt", "block_000000000000.nc"])
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [("python.nc", "paper.txt"), ("python.nc", "block_000000000000.nc"),
+     ("python.partial", "block_000000000000.nc")],
+)  # fmt: skip
 def test_directories_of_something_else_stay(name: str, content: str, tmp_path: Path) -> None:
     (tmp_path / "mine").write_text("mine")
     (tmp_path / name).mkdir()
@@ -230,54 +212,45 @@ def test_directories_of_something_else_stay(name: str, content: str, tmp_path: P
     assert (tmp_path / name / content).read_text() == "mine"
 
 
+def test_other_files_in_the_directory_of_blocks_stay(tmp_path: Path) -> None:
+    (tmp_path / "python.partial").mkdir()
+    (tmp_path / "python.partial/paper.txt").write_text("mine")
+    thud.sweep(HEIGHTS, tmp_path, replace=True)
+    assert (tmp_path / "python.partial/paper.txt").read_text() == "mine"
+
+
 @pytest.mark.parametrize("number", [errno.EMFILE, errno.EIO, errno.EACCES])
-@pytest.mark.parametrize("name", ["python.nc", "python_surrogate.npz"])
 def test_results_that_cannot_be_read_for_now_stay(
-    name: str, number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    number: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of this version, with `replace`."""
-    if name.endswith("npz"):
-        run: Callable[..., object] = thud.surrogate
-        study: dict[str, Any] = {
-            "parameters": {"height": {"low": 0.99, "high": 1.01}},
-            "surrogate": {"size": 64, "error": 1.0},
-        }
-    else:
-        run, study = thud.sweep, HEIGHTS
-    run(study, tmp_path)
-    inode = (tmp_path / name).stat().st_ino
+    thud.sweep(HEIGHTS, tmp_path)
+    inode = (tmp_path / "python.nc").stat().st_ino
 
     def fail(*_: object, **__: object) -> None:
-        raise OSError(number, os.strerror(number), name)
+        raise OSError(number, os.strerror(number), "python.nc")
 
     with monkeypatch.context() as patch:
-        patch.setattr("thud.studies.blocks.read_input", fail)
-        patch.setattr("thud.studies.trained_surrogate.read_input", fail)
+        patch.setattr("thud.studies.dataset.read_input", fail)
         with pytest.raises(OSError, match=os.strerror(number)):
-            run(study, tmp_path, replace=True)
-    assert (tmp_path / name).stat().st_ino == inode
+            thud.sweep(HEIGHTS, tmp_path, replace=True)
+    assert (tmp_path / "python.nc").stat().st_ino == inode
 
 
-def test_unfinished_blocks_of_another_size_are_computed_again(tmp_path: Path) -> None:
-    study = thud.read_study(HEIGHTS)
-    keep_one_block(study, tmp_path)
-    assert thud.sweep(study, tmp_path).dataset.identical(thud.sweep(study).dataset.assign_attrs(
-        thud.read_sweep(tmp_path / "python.nc").dataset.attrs))  # fmt: skip
-
-
-@pytest.mark.parametrize("moment", ["open", "has", "keep", "join"])
-def test_two_runs_at_once_both_end_with_the_whole_results(
-    moment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_two_runs_at_once_leave_the_whole_results(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Before this call of one run the other joins and removes all blocks."""
-    expected = thud.sweep(HEIGHTS).dataset
-    call = getattr(Blocks, moment)
+    """While one run computes its block, the other ends and removes its blocks."""
+    evaluate = run.evaluate
 
-    def other_first(*some: object) -> object:
-        monkeypatch.setattr(Blocks, moment, call)
+    def other_first(*block: Any) -> dict[str, Any]:  # noqa: ANN401
+        monkeypatch.setattr(run, "evaluate", evaluate)
         thud.sweep(HEIGHTS, tmp_path)
-        return call(*some)
+        return evaluate(*block)
 
-    monkeypatch.setattr(Blocks, moment, other_first)
-    assert values(thud.sweep(HEIGHTS, tmp_path).dataset).identical(values(expected))
+    monkeypatch.setattr(run, "evaluate", other_first)
+    with suppress(OSError):
+        thud.sweep(HEIGHTS, tmp_path)
+    found = thud.read_sweep(tmp_path / "python.nc").dataset
+    assert values(found).identical(values(thud.sweep(HEIGHTS).dataset))
     assert names_in(tmp_path) == ["python.nc"]

@@ -11,13 +11,13 @@ from conftest import REPOSITORY, names_in, naming, python
 
 import thud
 from thud import cli
-from thud.studies.kinds import KINDS, get_kind
+from thud.studies.kinds import KINDS, result_type
 
 
 @pytest.mark.parametrize("name", KINDS)
 def test_every_kind_follows_from_its_line(name: str) -> None:
-    kind = get_kind(name)
-    assert kind.name == name
+    assert result_type(name).kind == name
+    assert result_type(name) is getattr(thud, name.capitalize())
     assert callable(getattr(thud, name))
     assert cli.COMMANDS[name].help == KINDS[name].help
 

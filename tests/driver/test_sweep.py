@@ -23,49 +23,15 @@ from thud.base import tables, units
 from thud.base._schema import MODELS, SAMPLE_QUANTITIES
 from thud.base.units import powers_of, scaled
 from thud.case.keys import known_keys, with_values
-from thud.studies import directory, fit, samples, sampling, sweep
+from thud.studies import fit, run, sampling, sweep
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from pathlib import Path
     from types import ModuleType
 
     from conftest import ErrorsOf
 
 HEIGHTS = {"parameters": {"height": {"values": [50, 100], "unit": "cm"}}}
-
-
-def test_grid_holds_what_single_drops_give() -> None:
-    found = thud.sweep(
-        {
-            "fixed": {"model": "hollow_sphere"},
-            "parameters": {
-                "wall_thickness": {"values": [30, 35], "unit": "mm"},
-                "momentum_flux": {"values": ["none", "retarding"]},
-                "youngs_modulus": {"low": 1.5, "high": 1.7, "count": 3, "unit": "MPa"},
-            },
-        }
-    ).dataset
-    assert found["contact_time"].dims == ("wall_thickness", "momentum_flux", "youngs_modulus")
-    assert (found["status"] == 0).all()
-    for thickness in (0.030, 0.035):
-        for flux in ("none", "retarding"):
-            for modulus in (1.5e6, 1.6e6, 1.7e6):
-                ball = thud.Ball(wall_thickness=thickness, youngs_modulus=modulus)
-                impact = thud.solve(ball, model="hollow_sphere", momentum_flux=flux)
-                cell = found.sel(
-                    wall_thickness=thickness, momentum_flux=flux, youngs_modulus=modulus
-                )
-                for name in SAMPLE_QUANTITIES:
-                    assert float(cell[name]) == pytest.approx(getattr(impact, name), rel=1e-9)
-                for force in ("elastic", "floor"):
-                    np.testing.assert_allclose(
-                        cell[f"{force}_octave"], impact.levels(force=force), rtol=0, atol=1e-6
-                    )
-                verdict = impact.assess()
-                assert bool(cell["conforms"]) == bool(verdict)
-                margins = [min(c.value - c.lower, c.upper - c.value) for c in verdict.criteria[:5]]
-                assert float(cell["margin"]) == pytest.approx(min(margins), abs=1e-6)
 
 
 @pytest.mark.parametrize("model", ["hollow_sphere", "modal_ball"])
@@ -122,7 +88,7 @@ def test_other_makers_of_points_are_another_study(monkeypatch: pytest.MonkeyPatc
     assert grid.identity == before[1]
 
 
-@pytest.mark.parametrize("module", [directory, fit, sweep, tables, units])
+@pytest.mark.parametrize("module", [fit, sweep, tables, units])
 def test_examples_are_true(module: ModuleType) -> None:
     found = doctest.testmod(module)
     assert found.attempted > 0
@@ -264,7 +230,7 @@ def shifted(model: str, temperature: float, **law: object) -> tuple[float, float
         "temperature": {**WLF, "coefficient": 0.003},
         "parameters": {"temperature": {"values": [temperature]}},
     }
-    study = sweep.KIND.read_study(given)
+    study = thud.read_study(given)
     found = study.key_columns(study.parameter_columns(0, 1))
     return float(found["youngs_modulus"][0]), float(found["loss_factor"][0])
 
@@ -340,13 +306,15 @@ def test_samples_give_what_single_drops_give(fixed: dict[str, str]) -> None:
         one = found.isel(dict(zip(names, place, strict=True)))
         impact = thud.solve(with_values(study.case, {name: one[name].item() for name in names}))
         # What the ensemble promises: 1e-10 in forces, 1e-6 dB in levels.
-        for name in ("contact_time", "peak_force", "peak_elastic_force", "impulse"):
+        for name in SAMPLE_QUANTITIES:
             assert float(one[name]) == pytest.approx(getattr(impact, name), rel=1e-9)
         for force in ("elastic", "floor"):
             levels = impact.levels(force=force)
             np.testing.assert_allclose(one[f"{force}_octave"], levels, rtol=0, atol=1e-6)
         verdict = impact.assess(study.case.limits.source, study.case.levels.force)
         assert bool(one["conforms"]) == bool(verdict)
+        margins = [min(c.value - c.lower, c.upper - c.value) for c in verdict.criteria[:5]]
+        assert float(one["margin"]) == pytest.approx(min(margins), abs=1e-6)
 
 
 def test_each_worker_computes_blocks_on_one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -358,7 +326,7 @@ def test_each_worker_computes_blocks_on_one_thread(monkeypatch: pytest.MonkeyPat
         asked.append(options["threads"])
         return solve_many(parameters, case, **options)
 
-    monkeypatch.setattr(samples, "solve_many", count)
+    monkeypatch.setattr(run, "solve_many", count)
     thud.sweep(HEIGHTS, workers=3)
     thud.sweep({**HEIGHTS, "fixed": {"method": "fft"}})
     thud.sweep({"parameters": {"sample_rate": {"values": [44100, 48000]}}})
@@ -387,12 +355,8 @@ def test_fixed_model_is_that_of_the_case_or_has_its_defaults() -> None:
 def test_many_samples_need_a_word(tmp_path: Path) -> None:
     many: dict[str, Any] = {"name": "a", "design": {"kind": "random", "size": 200_000}}
     many["parameters"] = {"height": {"low": 0.5, "high": 1}}
-    with pytest.raises(thud.InputError, match=naming("a", 200000, "modal_ball", "MB", "yes")):
+    with pytest.raises(thud.InputError, match=naming("a", 200000, "modal_ball", "yes")):
         thud.sweep(many, tmp_path)
-    spread = {"low": 1, "high": 2, "count": 10**6}
-    many = {"name": "a", "parameters": dict.fromkeys(("height", "mass", "gravity"), spread)}
-    with pytest.raises(thud.InputError, match=naming("a.nc", "1.24e+15 MB")):
-        thud.sweep(many, tmp_path, allow_large=True)
     assert not (tmp_path / "a.partial").exists()
 
 
@@ -427,7 +391,6 @@ def test_many_samples_need_a_word(tmp_path: Path) -> None:
         (f"name = {'[' * 10_000}", naming("TOML")),
         ("name = '\udcff'", naming("byte 9", "UTF-8", "TOML")),
         ("parameters.height = 1", naming("height", 1, "values", "low")),
-        ("parameters.height.values = []", naming("height", "values", [])),
         ("parameters.height.values = ['high']", naming("height", "values", "'high'")),
         ("parameters.height.values = [inf]", naming("height", "values", "finite")),
         ("parameters.youngs_modulus = {values=[1e300], unit='GPa'}",
@@ -438,32 +401,17 @@ def test_many_samples_need_a_word(tmp_path: Path) -> None:
         ("parameters.height = {values=[1], count=2}",
          naming("height", "'count'", "values", "unit")),
         ("parameters.height = {low=1, high=2}", naming("height", "values", "grid")),
-        ("parameters.height = {low=1}", naming("height", "high")),
-        ("parameters.height = {low=2, high=1, count=3}", naming("height", "low", 2)),
-        ("parameters.height = {low=0, high=1, count=3, scale='log'}", naming("height", "low", 0)),
-        ("parameters.height = {low=1, high=2, count=1}", naming("height", "count", 1, 2)),
-        (
-            "parameters.height = {low=1, high=2, count=1000000000000}",
-            naming("height", "count", 10**12, 2, 1073741824),
-        ),
         (
             f"parameters.height = {{low=1, high=2, count=1{'0' * 400}}}",
             naming("height", "count"),
         ),
-        ("parameters.substeps = {low=1, high=3, count=4}", naming("substeps", "count", 4, 2, 3)),
-        (
-            "parameters.substeps = {low=1, high=1e9, count=3}",
-            naming("substeps", "low", "high", "1e+09", 1, 10000),
-        ),
         (
             "parameters = {height=$, mass=$, gravity=$}".replace(
                 "$", "{low=1, high=2, count=10_000_000}"),
-            naming("samples", "2^63 - 1", "grid"),
+            naming("samples", 2**30, "grid"),
         ),
         (f"design.seed = 1{'0' * 5000}", naming("TOML")),
         ("parameters.height = {std=1}", naming("height", "values", "grid")),
-        ("parameters.substeps.values = [1.5]", naming("substeps", "values", 1.5)),
-        ("parameters.substeps = {std=1}", naming("substeps", "values")),
         ("parameters.damping_law.values = ['some']", naming("damping_law", "'some'", "'rising'")),
         ("parameters.damping_law = {low=1, high=2}", naming("damping_law", "values")),
         ("parameters.bands.values = ['third']", naming("bands", "[fixed]")),
@@ -498,14 +446,6 @@ def test_many_samples_need_a_word(tmp_path: Path) -> None:
         ("temperature.reference = 1\nparameters.temperature.values = [1]",
          naming("[temperature]", "coefficient")),
         (
-            "temperature = {reference=1, c1=8}\nparameters.temperature.values = [1]",
-            naming("[temperature]", "c2"),
-        ),
-        (
-            "temperature = {reference=1, c1=8, c2=-1}\nparameters.temperature.values = [1]",
-            naming("[temperature]", "c2", -1, 0),
-        ),
-        (
             "fixed.model = 'hollow_sphere'\ntemperature = {reference=1, c1=8, c2=100}\n"  # noqa: ISC004
             "parameters.temperature.values = [1]",
             naming("c1", "hollow_sphere"),
@@ -518,17 +458,6 @@ def test_many_samples_need_a_word(tmp_path: Path) -> None:
         ("design.kind = 'cube'\nparameters.mass.values = [1]",
          naming("cube", "grid", "list", "random")),
         ("design.size = 3\nparameters.mass.values = [1]", naming("'size'", "kind")),
-        ("design.kind = 'random'\nparameters.mass.values = [1]", naming("size", 0, 1)),
-        ("design = {kind='sobol', size=100}\nparameters.mass.values = [1]",
-         naming("size", 100, 64, 128)),
-        (
-            "design = {kind='random', size=9}\nparameters.mass = {low=1, high=2, count=3}",
-            naming("mass", "count", "random", "low", "high", "scale"),
-        ),
-        (
-            "design.kind = 'list'\nparameters.mass.values = [1]\nparameters.height.values = [1, 2]",
-            naming("[parameters]", "values"),
-        ),
         (
             "fixed.model = 'measured_modes'\nparameters.frequency.values = [1]",
             naming("frequency", "list", "'frequency(1)'"),
@@ -551,16 +480,12 @@ def test_bad_studies_are_reported(
     assert list(tmp_path.iterdir()) == [path]
 
 
-@pytest.mark.parametrize(
-    ("compute", "design"), [(thud.sweep, "grid"), (thud.sweep, "list"), (thud.design, "grid")]
-)
-def test_exploding_designs_are_reported_before_they_are_made(
-    compute: Callable[[dict[str, Any]], object], design: str
-) -> None:
+def test_exploding_designs_are_reported_before_they_are_made() -> None:
     spread = {"low": 1, "high": 2, "count": 10**9}
-    study = {"design": {"kind": design}, "parameters": {"mass": spread, "height": spread}}
-    with pytest.raises(thud.InputError, match=naming("samples", "modal_ball")):
-        compute(study)
+    for design, words in (("grid", naming("samples", 2**30)), ("list", naming("samples", "yes"))):
+        study = {"design": {"kind": design}, "parameters": {"mass": spread, "height": spread}}
+        with pytest.raises(thud.InputError, match=words):
+            thud.sweep(study)
 
 
 def test_numbers_of_numpy_are_numbers() -> None:
@@ -629,7 +554,7 @@ def test_command_writes_figure_and_table(
     names = ["sweep.nc", "sweep.svg"]
     assert names_in(folder) == names
     printed = capsys.readouterr()
-    assert re.search(naming(80, "hollow_sphere", "0.085 MB"), printed.err)
+    assert re.search(naming(80, "hollow_sphere"), printed.err)
     assert "peak force, N" in printed.out
     assert "Results: outputs/sweep" in printed.out
 
@@ -701,11 +626,30 @@ def test_design_that_exceeds_the_memory_is_told(
     assert re.search(naming("[design] size", size), line)
 
 
-def test_samples_that_exceed_the_memory_are_told_before_they_are_computed() -> None:
-    height = thud.Parameter(low=0.5, high=1.0, count=2**30)
-    mass = thud.Parameter(low=2.4, high=2.6, count=2**30)
-    with pytest.raises(thud.InputError, match=f"{2**60} samples"):
-        thud.sweep({"parameters": {"height": height, "mass": mass}}, allow_large=True)
+def test_values_by_names_of_keys_are_a_grid() -> None:
+    height = thud.Parameter(low=50, high=100, count=2, unit="cm")
+    case = thud.Case(model=thud.HollowSphere())
+    found = thud.sweep({"height": height, "mass": [2.4, 2.6]}, case=case)
+    masses = {"values": np.array([2.4, 2.6])}
+    table = {"fixed": {"model": "hollow_sphere"}, "parameters": {"height": height, "mass": masses}}
+    assert found.dataset.drop_attrs().identical(thud.sweep(table).dataset.drop_attrs())
+    frame = found.to_dataframe()
+    assert frame.loc[0.5, 2.6]["floor_octave_63"] == found.dataset["floor_octave"].values[0, 1, 1]
+    with pytest.raises(thud.InputError, match=naming("'hight'", "'height'")):
+        thud.sweep({"hight": [1.0]})
+    with pytest.raises(thud.InputError, match=naming("case")):
+        thud.sweep({"case": {"drop": {}}, "parameters": {}}, case=case)
+
+
+@pytest.mark.parametrize("kind", ["sensitivity", "design", "uncertainty"])
+def test_results_are_functions_of_their_samples(kind: str, tmp_path: Path) -> None:
+    form = {"values": [0.9, 1.1]} if kind == "design" else {"low": 0.9, "high": 1.1}
+    study = {"parameters": {"height": form}, "design": {} if kind == "design" else {"size": 8}}
+    first = getattr(thud, kind)(study, tmp_path)
+    second = type(first)(thud.read_sweep(tmp_path / "python.nc").dataset)
+    assert second.rows() == first.rows()
+    first.save(tmp_path / "saved.nc")
+    assert type(first)(thud.read_sweep(tmp_path / "saved.nc").dataset).rows() == first.rows()
 
 
 def test_samples_state_sources_that_do_not_conform() -> None:

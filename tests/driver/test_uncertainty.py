@@ -6,12 +6,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-import xarray as xr
 from conftest import REPOSITORY, naming
-from scipy.stats import norm
 
 import thud
-from thud.studies.uncertainty import Uncertainty
 
 SIZE = 600
 SMALL: dict[str, Any] = {
@@ -67,15 +64,6 @@ def test_probability_of_a_criterion_that_is_known() -> None:
     )
     low, high = result.interval
     assert low < 0.5 < high
-
-
-@pytest.mark.parametrize(("hits", "trials"), [(0, 10), (10, 10), (3, 7), (368, 500)])
-def test_interval_is_wilson_s(hits: int, trials: int) -> None:
-    found = Uncertainty(xr.Dataset(), np.empty((0, 5)), "rubber_ball", hits, trials, 0).interval
-    share, z = hits / trials, norm.ppf(0.975)
-    # At its ends the share is z standard errors off: a quadratic equation.
-    coefficients = (1 + z**2 / trials, -2 * share - z**2 / trials, share**2)
-    assert found == pytest.approx(sorted(np.roots(coefficients).real), abs=1e-12)
 
 
 def test_samples_without_results_are_counted_apart() -> None:

@@ -15,7 +15,7 @@ from sentences import INNER, fault_of
 
 import thud
 from thud.studies.fit import FitStudy, read_fit_study, run_fit
-from thud.studies.kinds import KINDS, get_kind
+from thud.studies.kinds import KINDS
 
 if TYPE_CHECKING:
     import random
@@ -75,7 +75,7 @@ def attempt(chance: random.Random) -> tuple[str, str]:
             if isinstance(study, FitStudy):
                 table = run_fit(study).table()
             else:
-                table = get_kind(kind).run(study, allow_large=True, workers=1).table()
+                table = getattr(thud, kind)(study, allow_large=True, workers=1).table()
     except thud.ThudError as error:
         inner = INNER.search(str(error))
         return ("raw", f"{error}: {text!r}") if inner or "\n" in str(error) else ("failed", "")

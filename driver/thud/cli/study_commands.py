@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from thud.base.display import warn_if_not_drawn
 from thud.base.errors import NumericalError, ThudError
+from thud.base.files import replace_file
 from thud.cli.command import NO_FIGURES, QUIET, Command, argument, file_of, output
 from thud.cli.screen import print_notes, print_path, print_results, print_status, shows_progress
-from thud.studies.directory import open_directory
-from thud.studies.kinds import KINDS, get_kind
+from thud.studies.kinds import KINDS, result_type
 
 if TYPE_CHECKING:
     import argparse
 
-    from thud.studies.kind import RunOptions
+    from thud.studies.run import RunOptions
 
 _STUDY = argument("study", type=file_of("TOML file"), metavar="STUDY.toml", help="study file")
 _SAMPLES = (
@@ -32,68 +32,44 @@ _SAMPLES = (
 
 def study_commands() -> dict[str, Command]:
     """Return the command of each kind of study."""
-    return {
-        name: Command(
-            info.help,
-            (
-                _STUDY,
-                *output(
-                    "the results"
-                    + ("; an interrupted study resumes there" if info.has_samples else "")
-                    + " (default: outputs/<study name>)"
-                ),
-                *(_SAMPLES if info.has_samples else ()),
-                NO_FIGURES,
-                QUIET,
-            ),
-            run_study,
-            Command._field_defaults["after_interrupt"]
-            if info.has_samples
-            else "nothing is written",
-        )
-        for name, info in KINDS.items()
-    }
+    results = "the results; an interrupted study resumes there (default: outputs/<study name>)"
+    arguments = (_STUDY, *output(results), *_SAMPLES, NO_FIGURES, QUIET)
+    return {name: Command(kind.help, arguments, run_study) for name, kind in KINDS.items()}
 
 
 def run_study(options: argparse.Namespace) -> int:
     """Run a study, print its results, save files and figures; return the exit code."""
-    kind = get_kind(options.name)
-    study = kind.read_study(options.study)
+    result = result_type(options.name)
+    from thud.studies.run import compute, dask_executor, describe
+    from thud.studies.study import read_study
+
+    study = read_study(options.study, options.name)
+    if not options.quiet:
+        print_status(describe(study))
+    folder = Path(options.output or Path("outputs", study.name))
+    figures = () if options.no_figures else (f"{study.name}.svg",)
     run_options: RunOptions = {
+        "workers": options.workers,
+        "allow_large": options.allow_large,
         "progress": shows_progress(quiet=options.quiet),
         "replace": options.replace,
     }
-    if KINDS[options.name].has_samples:
-        run_options |= {
-            "workers": options.workers,
-            "allow_large": options.allow_large,
-        }
-    address = getattr(options, "scheduler", None)
-    kind.require_runnable(study, **run_options)
-    folder = Path(options.output or Path("outputs", study.name))
-    if not options.quiet:
-        print_status(kind.describe(study))
-    figures = not options.no_figures
-    directory = open_directory(folder, kind, study, replace=options.replace, figures=figures)
+    scheduler = options.scheduler
     try:
-        with ExitStack() as stack:
-            if address:
-                from thud.studies.backends import dask_executor
-
-                run_options["executor"] = stack.enter_context(dask_executor(address))
-            result = kind.compute(study, directory, **run_options)
+        with dask_executor(scheduler) if scheduler else nullcontext() as executor:
+            run_options["executor"] = executor
+            computed = compute(result, study, folder, figures, **run_options)
     except ThudError as error:
         raise error.within(options.study) from error
     if not options.quiet:
-        print_results(result.table())
-    print_notes(f"{options.study}: {text}" for text in (*result.warnings, *result.notes))
-    contents = kind.files(result, study)
-    if figures:
+        print_results(computed.table())
+    print_notes(f"{options.study}: {text}" for text in (*computed.warnings, *computed.notes))
+    if computed.succeeded and not options.no_figures:
         with warn_if_not_drawn("the figure of the study"):
-            from thud.plot import figure_files
+            from thud.plot.save_figures import figure_files
 
-            contents |= figure_files(result.figures(study.name))
-    directory.write(contents)
+            for name, content in figure_files({study.name: computed.plot()}).items():
+                replace_file(folder / name, content)
     if not options.quiet:
         print_path("Results", folder)
-    return 0 if result.succeeded else NumericalError.exit_code
+    return 0 if computed.succeeded else NumericalError.exit_code

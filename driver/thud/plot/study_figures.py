@@ -62,7 +62,7 @@ def draw_design(result: Design) -> Figure:
     values = result.dataset["margin"] if rating is None else rating
     label = f"Margin ({FORCE_NAMES[result.dataset.attrs['assessed_force']]}), dB"
     if rating is not None:
-        symbol = RATINGS[result.rating_name].replace("L_iA,Fmax", RATING_SYMBOL)
+        symbol = RATINGS[result.room.rating].replace("L_iA,Fmax", RATING_SYMBOL)
         label = f"{symbol},\ndB re 20 µPa"
     if len(result.axes) == 1:
         (name,) = result.axes
@@ -86,12 +86,16 @@ def _limits(result: Design) -> list[tuple[str, float]]:
     """
     if result.room_rating is None:
         return [("Octave limits", 0.0)]
-    limits = [(f"required, {result.required:g} dB", result.required)] if result.required else []
-    if result.rating_name == "octaves":
+    limits = (
+        [(f"required, {result.room.required:g} dB", result.room.required)]
+        if result.room.required
+        else []
+    )
+    if result.room.rating == "octaves":
         limits += [
             (f"class {number}, {limit:g} dB", limit)
             for number, limit in enumerate(CLASS_LIMITS, 1)
-            if limit != result.required
+            if limit != result.room.required
         ]
     return [(name, excess_level(limit)) for name, limit in limits]
 
@@ -114,7 +118,7 @@ def _draw_map(
     if is_margin and result.mark:
         axes.plot(
             *np.multiply(result.mark, factors), "*", markersize=9, markerfacecolor="white",
-            markeredgecolor="black", label=result.mark_name.capitalize(), clip_on=False, zorder=3,
+            markeredgecolor="black", label="Case", clip_on=False, zorder=3,
         )  # fmt: skip
     axes.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
     axes.grid(visible=False)

@@ -1,12 +1,16 @@
-"""Results of a study as an xarray.Dataset: names, units, provenance."""
+"""Results of a study as an xarray.Dataset: names, units, provenance; their files."""
 
 from __future__ import annotations
 
 import json
+from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
+from thud.base.checks import refuse
+from thud.base.files import is_failure, read_input, replace_file
+from thud.case.case import case_text
 from thud.impact.datasets import (
     FREQUENCIES,
     RESULTS,
@@ -14,64 +18,56 @@ from thud.impact.datasets import (
     case_attributes,
     sample_variables,
 )
-from thud.level.levels import BANDWIDTHS, FORCES, get_bands
 from thud.studies.sampling import sampler_versions
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
     from numpy.typing import NDArray
 
-    from thud.studies.parameter import Parameter
-    from thud.studies.samples import Columns, SampleStudy
-
-# Bytes on disk of a sample without its levels and parameters, and of an empty file.
-_SAMPLE_BYTES = 95
-_FILE_BYTES = 27_000
+    from thud.studies.study import Columns, Study
 
 
-def disk_space(study: SampleStudy) -> int:
-    """Return the estimated bytes of the results of a study, blocks included."""
-    total = study.count
-    files = 1 - (-total // study.block_size)
-    # The verdict needs octaves.
-    extra = study.case.levels.bands
-    names = BANDWIDTHS if extra == "both" else {BANDWIDTHS[0], extra}
-    levels = len(FORCES) * sum(len(get_bands(bands).nominal) for bands in names)
-    return files * _FILE_BYTES + 2 * total * (_SAMPLE_BYTES + 8 * (levels + len(study.parameters)))
-
-
-def new_dataset(study: SampleStudy, columns: Columns, results: Columns) -> xr.Dataset:
+def new_dataset(
+    study: Study, columns: Columns, results: Columns, provenance: dict[str, Any]
+) -> xr.Dataset:
     """Return the results of samples along the dimension ``sample``, levels also along bands.
 
-    `columns` are the parameters of the samples by name, `results` the results of `evaluate`.
+    `columns` are the parameters of the samples by name, `results` the results of `evaluate`,
+    `provenance` the attributes.
     """
     coordinates, variables = sample_variables(results)
     for parameter in study.parameters:
+        key, temperature = parameter.key, study.temperature
+        meaning = key.meaning
+        if temperature and parameter.name in temperature.keys:
+            meaning += f" at {temperature.reference:g} degC; the temperature changes it"
+        shown_unit, power = parameter.shown_unit
+        attrs = {
+            **attributes(key),
+            "long_name": meaning,
+            "group": key.group,
+            "key": parameter.name,
+            "shown_unit": shown_unit,
+            "shown_exponent": -power,
+            "scale": parameter.scale,
+        }
         values = _objects(columns[parameter.name])
-        coordinates[parameter.coordinate_name] = ("sample", values, _attributes(study, parameter))
+        coordinates[parameter.coordinate_name] = ("sample", values, attrs)
     if study.surrogate:
         for name in study.surrogate.outputs:
             variables[name][-1]["surrogate_error"] = study.surrogate.error_of(name)
-    return _in_order(xr.Dataset(variables, coordinates, provenance(study)))
+            variables[name][-1]["surrogate_variance"] = study.surrogate.mean_square(name)
+    names = [*FREQUENCIES, *(p.coordinate_name for p in study.parameters)]
+    return xr.Dataset(
+        {name: variables[name] for name in RESULTS if name in variables},
+        {name: coordinates[name] for name in names if name in coordinates},
+        provenance,
+    )
 
 
-def _attributes(study: SampleStudy, parameter: Parameter) -> dict[str, Any]:
-    key, temperature = parameter.key, study.temperature
-    shown_unit, power = parameter.shown_unit
-    meaning = key.meaning
-    if temperature and parameter.name in temperature.keys:
-        meaning += f" at {temperature.reference:g} degC; the temperature changes it"
-    return {
-        **attributes(key),
-        "long_name": meaning,
-        "group": key.group,
-        "key": parameter.name,
-        "shown_unit": shown_unit,
-        "shown_exponent": -power,
-        "scale": parameter.scale,
-    }
-
-
-def provenance(study: SampleStudy) -> dict[str, str]:
+def provenance_of(study: Study) -> dict[str, Any]:
     """Return the provenance of results as attributes of a dataset."""
     return {
         "title": f"{study.kind} {study.name}",
@@ -79,24 +75,20 @@ def provenance(study: SampleStudy) -> dict[str, str]:
         "study_kind": study.kind,
         "identity": json.dumps(study.identity),
         "design": study.design,
-        "seed": str(study.seed) if study.size else "none",
+        "size": study.size,
+        "seed": study.seed if study.size else "none",
         "parameters": " ".join(parameter.coordinate_name for parameter in study.parameters),
+        **({"density": study.density} if study.density is not None else {}),
         **({"surrogate": study.surrogate.accuracy} if study.surrogate else {}),
         **sampler_versions(study.design),
         **case_attributes(study.case),
+        "case": case_text(study.case).decode(),
     }
 
 
-def _in_order(dataset: xr.Dataset) -> xr.Dataset:
-    """Return a dataset with its variables in the usual order."""
-    results = {name: dataset.variables[name] for name in RESULTS if name in dataset.data_vars}
-    names = [*FREQUENCIES, *dataset.attrs["parameters"].split()]
-    coordinates = {name: dataset.variables[name] for name in names if name in dataset.coords}
-    return xr.Dataset(results, coordinates, dataset.attrs)
-
-
-def grid_of(study: SampleStudy, dataset: xr.Dataset) -> xr.Dataset:
-    """Return a complete dataset; a grid gets a dimension for each parameter."""
+def join_blocks(study: Study, parts: Sequence[xr.Dataset]) -> xr.Dataset:
+    """Return all blocks as one dataset; a grid gets a dimension for each parameter."""
+    dataset = concatenate(parts)
     if study.design != "grid":
         return dataset
     coordinates = {name: dataset[name] for name in FREQUENCIES if name in dataset.coords}
@@ -112,6 +104,53 @@ def grid_of(study: SampleStudy, dataset: xr.Dataset) -> xr.Dataset:
     return xr.Dataset(variables, {**coordinates, **axes}, dataset.attrs)
 
 
+def concatenate(parts: Sequence[xr.Dataset]) -> xr.Dataset:
+    """Return blocks as one dataset along the dimension ``sample``."""
+    return xr.concat(
+        parts, "sample", data_vars="minimal", coords="minimal", compat="override",
+        join="override", combine_attrs="override",
+    )  # fmt: skip
+
+
 def _objects(values: NDArray[Any]) -> NDArray[Any]:
     """Return an array; texts become objects, because xarray would fix their length."""
     return values.astype(object) if values.dtype.kind == "U" else values
+
+
+def write_dataset(dataset: xr.Dataset, path: Path) -> None:
+    """Write a NetCDF file atomically."""
+    replace_file(path, bytes(dataset.to_netcdf(engine="h5netcdf")))
+
+
+def read_dataset(path: Path) -> xr.Dataset:
+    """Return the results in a file, or of the blocks in a directory; see `thud.read_sweep`."""
+    if path.suffix == ".partial":
+        blocks = block_paths(path)
+        if not blocks:
+            refuse(f"{path} holds no finished samples", "results of a study")
+        return concatenate([read_dataset(block) for block in blocks])
+    try:
+        content = BytesIO(read_input(path))
+        with xr.open_dataset(content, engine="h5netcdf", phony_dims="access") as file:
+            dataset = file.load()
+    except (OSError, ValueError, KeyError, RuntimeError) as error:
+        if is_failure(error):
+            raise
+        refuse(f"{path} cannot be read", "results of a study, or remove it", error)
+    variables = dataset.variables.items()
+    texts: dict[Any, Any] = {n: v.astype(object) for n, v in variables if v.dtype.kind == "U"}
+    return dataset.assign(texts).drop_encoding()
+
+
+def read_identity(path: Path) -> dict[str, str] | None:
+    """Return the identity of results in a file or a directory of blocks; None without blocks."""
+    if path.suffix == ".partial":
+        blocks = block_paths(path)
+        return read_identity(blocks[0]) if blocks else None
+    identity: dict[str, str] = json.loads(read_dataset(path).attrs["identity"])
+    return identity
+
+
+def block_paths(folder: Path) -> list[Path]:
+    """Return the files of finished blocks in order."""
+    return sorted(folder.glob("block_*.nc"))

@@ -3,156 +3,78 @@
 from __future__ import annotations
 
 import os
-import shutil
-from dataclasses import dataclass
+from contextlib import suppress
 from pathlib import Path
-from tempfile import TemporaryFile
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from thud.base.checks import refuse
-from thud.base.files import is_failure, is_one_of, refuse_foreign, replace_file
+from thud.base.checks import refuse, shown_text
+from thud.base.files import is_failure, is_one_of, refuse_foreign
+from thud.studies.dataset import read_identity
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Iterable
 
-    from thud.studies.kind import Kind
     from thud.studies.study import Study
-
-# Endings of the figures.
-FORMATS = (".svg",)
-# Maximum number of listed differences; others are counted.
-_MAX_SHOWN = 3
-
-
-@dataclass(frozen=True)
-class StudyDirectory:
-    """The directory of a study.
-
-    Attributes
-    ----------
-    folder : Path
-        The directory.
-    inputs : tuple of path-like
-        Files that the study depends on, never replaced.
-    replace : bool
-        Replace results of another version of the study, and files that belong to no study.
-    """
-
-    folder: Path
-    inputs: tuple[str | os.PathLike[str], ...] = ()
-    replace: bool = False
-
-    def write(self, contents: Mapping[str, bytes]) -> list[Path]:
-        """Write files and return their paths; raise InputError for the path of an input."""
-        for name, content in contents.items():
-            self.require_no_input(self.folder / name)
-            replace_file(self.folder / name, content)
-        return [self.folder / name for name in contents]
-
-    def require_no_input(self, path: Path) -> None:
-        """Raise InputError if a path is an input."""
-        if is_one_of(path, self.inputs):
-            refuse(f"{path} is an input, which is never replaced", "another directory")
 
 
 def open_directory(
-    folder: str | os.PathLike[str],
-    kind: Kind[Any, Any],
-    study: Study,
-    *,
-    replace: bool = False,
-    figures: bool = True,
-) -> StudyDirectory:
-    """Return the directory of a study, created if it is missing.
+    folder: str | os.PathLike[str], study: Study, others: Iterable[str] = (), *, replace: bool
+) -> tuple[Path, Path]:
+    """Return the paths of the results of a study and of the directory of its blocks.
 
-    Raises InputError, without `replace`, if it holds results of another version of the study or a
-    file of another origin is in the way; OSError if the directory cannot be made.
+    Both are made by the caller; `others` are names of files that it writes beside them. Results of
+    another version of the study and files that thud has not written are refused, or removed with
+    `replace`; inputs of the study are never replaced.
     """
-    directory = StudyDirectory(Path(folder), study.inputs, replace)
-    directory.folder.mkdir(parents=True, exist_ok=True)
-    with TemporaryFile(dir=directory.folder):
-        pass  # a directory that cannot be written is an error now, not after hours
-    names = kind.identity_files(study)
-    listed = kind.listed_files(study)
-    readers = dict.fromkeys((directory.folder / name for name in names), kind.identity_in)
-    begun = any(map(os.path.lexists, readers))
-    for path in (directory.folder / n for n in listed if figures or not n.endswith(FORMATS)):
-        directory.require_no_input(path)
-        if _is_directory(path) or (os.path.lexists(path) and not (begun or replace)):
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    results = folder / f"{study.name}.nc", folder / f"{study.name}.partial"
+    begun = [path for path in results if os.path.lexists(path)]
+    beside = [folder / name for name in others if os.path.lexists(folder / name)]
+    for path in (*begun, *beside):
+        if is_one_of(path, study.inputs):
+            refuse(f"{path} is an input, which is never replaced", "another directory")
+        if path in beside and (_is_directory(path) or not (begun or replace)):
             refuse_foreign(path)
-    require_version(readers, study, directory, listed)
-    return directory
+    old = [path for path in begun if _is_outdated(path, study, replace=replace)]
+    for path in (*old, *beside, folder / f"{study.name}.svg") if old else ():
+        remove(path)
+    return results
 
 
-def require_version(
-    readers: Mapping[Path, Callable[[Path], dict[str, str] | None]],
-    study: Study,
-    results: StudyDirectory,
-    others: Iterable[str] = (),
-) -> None:
-    """Raise InputError if results belong to another version of a study, or remove them to replace.
+def _is_outdated(path: Path, study: Study, *, replace: bool) -> bool:
+    """Return whether results are not of this study; raise InputError without `replace`."""
+    try:
+        before = {} if path.is_symlink() else read_identity(path)
+    except (OSError, ValueError, LookupError, TypeError) as error:
+        if is_failure(error):
+            raise
+        before = {}
+    if before is None or before == study.identity:
+        return False
+    if not before and (not replace or _is_directory(path)):
+        refuse_foreign(path)
+    if not replace:
+        now = study.identity
+        key = next(key for key in {**before, **now} if before.get(key) != now.get(key))
+        one, other = (shown_text(identity.get(key, "not stated")) for identity in (before, now))
+        refuse(
+            f"{path} belongs to another version of this study: {key} = {one} is now {other}",
+            "another directory, or --replace (replace=True) to compute the study again",
+        )
+    return True
 
-    `readers` return the identity of the results at a path; `others` are names of files that are
-    removed with them. All results are checked before any is removed.
-    """
-    outdated: list[Path] = []
-    for path, identity_in in readers.items():
-        if not os.path.lexists(path):
-            continue
-        results.require_no_input(path)
-        try:
-            changes = _changes(path, identity_in, study)
-        except (OSError, ValueError, LookupError, TypeError) as error:
-            if is_failure(error):
-                raise
-            if _is_directory(path) or not results.replace:
-                refuse_foreign(path)
-            outdated.append(path)
-            continue
-        if changes and not results.replace:
-            refuse(
-                f"{path} belongs to another version of this study: {changes}",
-                "another directory, or --replace (replace=True) to compute the study again",
-            )
-        if changes:
-            outdated.append(path)
-    for path in [*outdated, *(results.folder / name for name in others if outdated)]:
-        _remove(path)
+
+def remove(path: Path) -> None:
+    """Remove a file, or a directory of blocks unless it has other files."""
+    if not _is_directory(path):
+        path.unlink(missing_ok=True)
+        return
+    for block in path.glob("*block_*.nc*"):
+        block.unlink(missing_ok=True)
+    with suppress(OSError):
+        path.rmdir()
 
 
 def _is_directory(path: Path) -> bool:
     return path.is_dir() and not path.is_symlink()
-
-
-def _remove(path: Path) -> None:
-    if _is_directory(path):
-        shutil.rmtree(path)
-    else:
-        path.unlink(missing_ok=True)
-
-
-def _changes(path: Path, identity_in: Callable[[Path], dict[str, str] | None], study: Study) -> str:
-    """Return how a study differs from saved results; raise if these are not results."""
-    if path.is_symlink():
-        message = f"{path} is a link"
-        raise ValueError(message)
-    before = identity_in(path)
-    return "" if before is None else differences(before, study.identity)
-
-
-def differences(before: Mapping[str, str], now: Mapping[str, str]) -> str:
-    """Return the differences of two versions of a study as text, empty if they agree.
-
-    >>> differences({"[design] size": "500"}, {"[design] size": "1000", "[design] seed": "1"})
-    '[design] size = 500 is now 1000, [design] seed = 1 is new'
-    """
-    changes = []
-    for key in {**before, **now}:
-        if key not in before:
-            changes.append(f"{key} = {now[key]} is new")
-        elif key not in now:
-            changes.append(f"{key} = {before[key]} is gone")
-        elif before[key] != now[key]:
-            changes.append(f"{key} = {before[key]} is now {now[key]}")
-    more = [f"{len(changes) - _MAX_SHOWN} more"] if len(changes) > _MAX_SHOWN else []
-    return ", ".join(changes[:_MAX_SHOWN] + more)

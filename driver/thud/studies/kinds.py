@@ -1,64 +1,41 @@
-"""Kinds of studies; the module of a kind is imported when the kind is used."""
+"""Kinds of studies of samples; the module of a kind is imported when the kind is used."""
 
 from __future__ import annotations
 
 import importlib
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from thud.base.checks import require_choice
 from thud.base.extras import require_extra
 
 if TYPE_CHECKING:
-    from thud.studies.kind import Kind
-    from thud.studies.study import Source, Study
+    from thud.studies.study_result import SampleResult
 
 
-class KindInfo(NamedTuple):
-    """Help of the command of a kind of study, and whether it computes samples."""
+class Kind(NamedTuple):
+    """Help of the command of a kind of study, and its sampling designs, the default first."""
 
     help: str
-    has_samples: bool = True
+    designs: tuple[str, ...]
 
 
-# A key names the command, the function, and the module with the `Kind` as ``KIND``.
+# A key names the command, the function, and the module with the class of the result, such as
+# `Sweep`, which is made from the dataset of all samples.
 KINDS = {
-    "sweep": KindInfo("drops over a grid, a list or a random design of parameters"),
-    "sensitivity": KindInfo("Sobol indices: how much each parameter affects each result"),
-    "design": KindInfo("which geometries and materials conform to the standards"),
-    "uncertainty": KindInfo("effect of tolerances on levels and conformity"),
+    "sweep": Kind(
+        "drops over a grid, a list or a random design of parameters",
+        ("grid", "list", "random", "latin_hypercube", "sobol"),
+    ),
+    "sensitivity": Kind(
+        "Sobol indices: how much each parameter affects each result", ("saltelli",)
+    ),
+    "design": Kind("which geometries and materials conform to the standards", ("grid",)),
+    "uncertainty": Kind("effect of tolerances on levels and conformity", ("random",)),
 }
 
 
-def get_kind(name: str) -> Kind[Any, Any]:
-    """Return a kind of study by name.
-
-    Raises InputError if it is unknown or its dependencies are missing.
-    """
-    require_choice("kind", name, KINDS)
+def result_type(kind: str) -> type[SampleResult]:
+    """Return the class of the results of a kind; raise InputError if a package is missing."""
     with require_extra("studies"):
-        kind: Kind[Any, Any] = importlib.import_module(f"thud.studies.{name}").KIND
-    return kind
-
-
-def read_study(source: Source, kind: str = "sweep") -> Study:
-    """Read a study.
-
-    Parameters
-    ----------
-    source
-        Path of a TOML file, or its content as a mapping; see docs/studies.md.
-    kind
-        ``"sweep"``, ``"sensitivity"``, ``"design"`` or ``"uncertainty"``.
-
-    Returns
-    -------
-    Study
-        The study, complete and checked.
-
-    Raises
-    ------
-    InputError
-        If the study is invalid; the message names file, table, key and what is allowed.
-    """
-    study: Study = get_kind(kind).read_study(source)
-    return study
+        module = importlib.import_module(f"thud.studies.{kind}")
+    result: type[SampleResult] = getattr(module, kind.capitalize())
+    return result

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,14 +27,13 @@ from thud.case.keys import Value, find_key
 from thud.impact.datasets import coordinate_name
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-    from typing import Self
+    from collections.abc import Sequence
 
     from numpy.typing import NDArray
 
     from thud.case.case import Case
 
-# Maximum number of values of a parameter, or of base samples; it limits the memory.
+# Maximum number of samples, of values of a parameter, and of base samples.
 MAX_VALUES = 2**30
 # Entries of the table of a varying parameter besides `unit`, by the entry that selects the form
 # (list, range or normal distribution), and entries of the table of a fitted parameter.
@@ -89,11 +88,6 @@ class Parameter(Plain):
     name: str = ""
     key: Key = field(default=Key("", "", ""), repr=False)
 
-    def __new__(cls, *_: object, **words: object) -> Self:
-        """Raise InputError for an unknown keyword."""
-        refuse_unknown("Parameter()", words, (option.name for option in fields(cls)))
-        return super().__new__(cls)
-
     @property
     def numeric(self) -> bool:
         """Whether the values are numbers."""
@@ -105,7 +99,7 @@ class Parameter(Plain):
         return coordinate_name(self.name, self.key)
 
     @property
-    def table(self) -> dict[str, object]:
+    def table(self) -> dict[str, Any]:
         """Its table in a study, without defaults."""
         words = (word for word in vars(self) if word not in {"name", "key"})
         return {w: vars(self)[w] for w in words if vars(self)[w] != getattr(Parameter, w)}
@@ -119,9 +113,8 @@ class Parameter(Plain):
     @property
     def size(self) -> int:
         """Number of values in a grid."""
-        if self.values is not None:
-            return len(self.values)
-        return len(self.grid()) if self.key.kind == "whole" and self.count else self.count
+        whole = self.key.kind == "whole" and self.count
+        return len(self.grid()) if whole or self.values is not None else self.count
 
     def grid(self) -> NDArray[np.generic]:
         """Return the values of a grid."""
@@ -151,64 +144,69 @@ class Parameter(Plain):
             result = self.low + fraction * (high - self.low)
         return np.minimum(np.floor(result), self.high).astype(int) if whole else result
 
-    def trial(self, fraction: float) -> Value | None:
-        """Return a value for a trial case: the start, a quantile, or None."""
-        if self.start is not None:
-            return self.start
-        if self.values is None and self.std is None and None in {self.low, self.high}:
-            return None
-        result: Value = self.quantiles(np.array([fraction])).tolist()[0]
-        return result
-
     def __str__(self) -> str:
-        """Return the parameter as it would be written in a file."""
-        _, power = self.shown_unit
-        entries: dict[str, Any] = self.table
-        for word, value in entries.items():
-            if word == "values":
-                entries[word] = [_in_unit(entry, power) for entry in value]
-            elif word != "count":
-                entries[word] = _in_unit(value, power)
-        return f"{{ {', '.join(f'{word} = {value!r}' for word, value in entries.items())} }}"
-
-
-def _in_unit(value: Value, power: int) -> Value:
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    return scaled(value, -power) if number and power else value  # type: ignore[arg-type]
+        """Return the numbers in the unit of the key."""
+        entries = {word: value for word, value in self.table.items() if word != "unit"}
+        return f"{entries} {self.key.unit} (stated in {self.shown_unit[0]})"
 
 
 def read_varied(name: str, table: object, case: Case, default_mean: Value | None) -> Parameter:
     """Return a parameter that varies; `default_mean` is its value in the case."""
     words = [word for form in ENTRIES_BY_FORM.values() for word in form]
-    label, key, table, power = _read_table(name, table, case, words)
-    form = next((form for form in ENTRIES_BY_FORM if form in table), None)
+    label, key, entries, power = _read_table(name, table, case, words)
+    form = next((form for form in ENTRIES_BY_FORM if form in entries), None)
     if form is None:
         refuse(
             f"{label} = {shown(table)} has no values",
             "a table with values = [...], with low and high, or with std; each may have a unit",
         )
-    refuse_unknown(f"{label} with {form}", table, (*ENTRIES_BY_FORM[form], "unit"))
+    refuse_unknown(f"{label} with {form}", entries, (*ENTRIES_BY_FORM[form], "unit"))
     if form != "values" and key.kind not in NUMERIC_KINDS:
         allowed = ", ".join(map(repr, key.choices)) or "true, false"
         refuse(f"{label}: its values are not numbers", f"values = [...] of {allowed}")
-
-    def read(word: str) -> float:
-        return float(read_value(f"{label}: {word}", key, table[word], power))
-
-    result: dict[str, Any]
+    values = entries.get("values", ())
+    if form == "values" and not (isinstance(values, list | tuple) and values):
+        refuse_value(f"{label}: values", values, "a list of at least one value")
+    numbers: dict[str, Any] = {
+        word: float(read_value(f"{label}: {word}", key, entries[word], power))
+        for word in ("low", "high", "mean", "std")
+        if word in entries
+    }
+    result = {word: value for word, value in entries.items() if word not in numbers}
+    result |= numbers
     if form == "values":
-        values = table["values"]
-        if not isinstance(values, list | tuple) or not values:
-            refuse(
-                f"{label}: values = {shown(values)} is empty or not a list",
-                "a list of at least one value",
-            )
-        result = {"values": tuple(read_value(f"{label}: values", key, v, power) for v in values)}
+        result["values"] = tuple(read_value(f"{label}: values", key, v, power) for v in values)
     elif form == "low":
-        result = _between(label, key, table, read)
+        _check_range(label, key, result, entries)
     else:
-        result = _normal(label, key, table, read, default_mean)
-    return Parameter(**result, unit=table.get("unit"), name=name, key=key)
+        _check_normal(label, key, result, default_mean)
+    return Parameter(**result, name=name, key=key)
+
+
+def _check_range(label: str, key: Key, table: Mapping[str, Any], stated: Mapping[str, Any]) -> None:
+    """Raise InputError for a range that is not allowed; `table` has numbers in the key's unit."""
+    if "high" not in table:
+        refuse(f"{label} has low but not high", "both low and high")
+    low, high, scale = table["low"], table["high"], table.get("scale", _SCALES[0])
+    require_choice(f"{label}: scale", scale, _SCALES)
+    if not low < high or (scale == "log" and low <= 0):
+        allowed = "0 < low < high" if scale == "log" else "low < high"
+        refuse_value(f"{label}: low", stated["low"], allowed)
+    if "count" in table:
+        most = min(int(high - low) + 1, MAX_VALUES) if key.kind == "whole" else MAX_VALUES
+        require_whole(f"{label}: count", table["count"], 2, most)
+
+
+def _check_normal(label: str, key: Key, table: dict[str, Any], default_mean: Value | None) -> None:
+    """Raise InputError for a normal distribution that is not allowed; add its mean."""
+    if key.kind == "whole":
+        refuse(f"{label}: std is not allowed for a whole number", "values = [...], or low and high")
+    if not table["std"] > 0:
+        refuse_value(f"{label}: std", table["std"], f"0 {key.unit} < std")
+    mean = table.setdefault("mean", default_mean)
+    if mean is None or not math.isfinite(float(mean)):
+        refuse(f"{label} has no mean", "both mean and std")
+    table["mean"] = float(mean)
 
 
 def read_fitted(name: str, entry: object, case: Case) -> Parameter:
@@ -258,50 +256,6 @@ def read_value(label: str, key: Key, value: object, power: int) -> Value:
     if not valid:
         refuse_value(label, value, allowed)
     return int(number) if key.kind == "whole" else result  # type: ignore[return-value]
-
-
-def _between(
-    label: str, key: Key, table: Mapping[str, Any], read: Callable[[str], float]
-) -> dict[str, Any]:
-    if "high" not in table:
-        refuse(f"{label} has low but not high", "both low and high")
-    low, high = read("low"), read("high")
-    whole = key.kind == "whole"
-    # A limit that is the name of another key depends on the sample, so it is not checked here.
-    lower = -math.inf if isinstance(key.lower, str) else key.lower
-    upper = math.inf if isinstance(key.upper, str) else key.upper
-    if whole and not lower <= low <= high <= upper:
-        refuse(
-            f"{label}: low = {low:g} and high = {high:g} are not allowed",
-            f"{lower:g} <= low < high <= {upper:g}",
-        )
-    count, scale = table.get("count", 0), table.get("scale", _SCALES[0])
-    require_choice(f"{label}: scale", scale, _SCALES)
-    is_logarithmic = scale == "log"
-    if not low < high or (is_logarithmic and low <= 0):
-        allowed = "0 < low < high" if is_logarithmic else "low < high"
-        refuse_value(f"{label}: low", table["low"], allowed)
-    if "count" in table:
-        require_whole(f"{label}: count", count, 2, int(high - low) + 1 if whole else MAX_VALUES)
-    return {"low": low, "high": high, "count": count, "scale": scale}
-
-
-def _normal(
-    label: str,
-    key: Key,
-    table: Mapping[str, Any],
-    read: Callable[[str], float],
-    default_mean: Value | None,
-) -> dict[str, Any]:
-    if key.kind == "whole":
-        refuse(f"{label}: std is not allowed for a whole number", "values = [...], or low and high")
-    std = read("std")
-    if not std > 0:
-        refuse_value(f"{label}: std", table["std"], "0 < std")
-    mean = read("mean") if "mean" in table else default_mean
-    if mean is None or not math.isfinite(float(mean)):
-        refuse(f"{label} has no mean", "both mean and std")
-    return {"mean": float(mean), "std": std}
 
 
 def read_quantity(label: str, entry: object, unit: str) -> Any:  # noqa: ANN401 - a value of any kind

@@ -11,18 +11,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.base.checks import MAX_SEED, refuse, refuse_unknown, refuse_value, require_whole
-from thud.studies.parameter import MAX_VALUES, Parameter
+from thud.studies.parameter import MAX_VALUES
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
+    from thud.studies.parameter import Parameter
+
 SAMPLED = ("random", "latin_hypercube", "sobol", "saltelli")
 # Minimum number of base samples for Sobol indices.
 MIN_BASE_SAMPLES = 4
-# Largest integer of NumPy.
-_MAX_SAMPLES = 2**63 - 1
 
 
 def sampler_versions(design: str) -> dict[str, str]:
@@ -38,24 +38,24 @@ def read_design(
     design = table.get("kind", allowed[0])
     if design not in allowed:
         refuse_value("[design] kind", design, ", ".join(allowed))
-    words = ("kind", "size", "seed") if design in SAMPLED else ("kind",)
+    is_sampled = design in SAMPLED
+    words = ("kind", "size", "seed") if is_sampled else ("kind",)
     refuse_unknown(f"[design] of kind {design}", table, words)
     for parameter in parameters:
-        if design in SAMPLED and parameter.count:
+        label = f"[parameters] {parameter.name}"
+        if is_sampled and parameter.count:
+            refuse(f"{label}: count is not used by a {design} design", "low, high and scale")
+        if not is_sampled and not parameter.size:
             refuse(
-                f"[parameters] {parameter.name}: count is not used by a {design} design",
-                "low, high and scale",
-            )
-        if design not in SAMPLED and not parameter.size:
-            refuse(
-                f"[parameters] {parameter.name} has no values for a {design} design",
+                f"{label} has no values for a {design} design",
                 "values = [...], or low, high and count",
             )
-    if design == "list" and len({p.size for p in parameters}) > 1:
-        refuse("[parameters] differ in their number of values", "the same for all")
-    if design == "grid" and math.prod(p.size for p in parameters) > _MAX_SAMPLES:
-        refuse("[parameters] make too many samples", "up to 2^63 - 1 in a grid")
-    if design not in SAMPLED:
+    if not is_sampled:
+        sizes = [parameter.size for parameter in parameters]
+        if design == "list" and len(set(sizes)) > 1:
+            refuse("[parameters] differ in their number of values", "the same for all")
+        if design == "grid" and math.prod(sizes) > MAX_VALUES:
+            refuse("[parameters] make too many samples", f"up to {MAX_VALUES} in a grid")
         return {"design": design}
     size, seed = table.get("size", 0), table.get("seed", 0)
     minimum = MIN_BASE_SAMPLES if design == "saltelli" else 1
@@ -77,35 +77,27 @@ def unit_samples(  # noqa: PLR0913, PLR0917 - the numbers of a design
     if design == "random":
         generator = np.random.PCG64(seed).advance(start * dimension)
         return np.random.Generator(generator).random((stop - start, dimension))
-    if design == "sobol":
-        from scipy.stats import qmc
-
-        points = qmc.Sobol(dimension, rng=seed)
-        if start:
-            points.fast_forward(start)
-        with warnings.catch_warnings():
-            # The size of the design is a power of 2, that of a block need not be.
-            warnings.simplefilter("ignore", UserWarning)
-            return _float(points.random(stop - start))
     return _all_points(design, dimension, size, seed)[start:stop]
 
 
 @lru_cache(maxsize=1)
 def _all_points(design: str, dimension: int, size: int, seed: int) -> NDArray[np.float64]:
-    """Return all points of a design that cannot be sampled block by block."""
+    """Return all points of a design that is not sampled block by block."""
     try:
-        if design == "latin_hypercube":
+        if design == "saltelli":
+            from SALib.sample import sobol as saltelli
+
+            names = list(map(str, range(dimension)))
+            cube = {"num_vars": dimension, "names": names, "bounds": [[0.0, 1.0]] * dimension}
+            points = saltelli.sample(cube, size, calc_second_order=False, seed=seed)
+        else:
             from scipy.stats import qmc
 
-            return _float(qmc.LatinHypercube(dimension, rng=seed).random(size))
-        from SALib.sample import sobol as saltelli
-
-        names = list(map(str, range(dimension)))
-        cube = {"num_vars": dimension, "names": names, "bounds": [[0.0, 1.0]] * dimension}
-        return _float(saltelli.sample(cube, size, calc_second_order=False, seed=seed))
+            engine = qmc.Sobol if design == "sobol" else qmc.LatinHypercube
+            with warnings.catch_warnings():
+                # The training of a surrogate takes parts of Sobol's sequence.
+                warnings.simplefilter("ignore", UserWarning)
+                points = engine(dimension, rng=seed).random(size)
+        return np.asarray(points, dtype=np.float64)
     except MemoryError as error:
         refuse(f"[design] size = {size} of kind {design} does not fit in memory", "fewer", error)
-
-
-def _float(points: Any) -> NDArray[np.float64]:  # noqa: ANN401 - of libraries without types
-    return np.asarray(points, dtype=np.float64)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Unpack
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, ClassVar, Unpack
 
 import numpy as np
 import xarray as xr
 
 from thud.base.checks import refuse
 from thud.level.levels import get_bands
-from thud.studies.sample_kind import SampleKind
+from thud.studies.run import compute
 from thud.studies.sampling import MIN_BASE_SAMPLES
 from thud.studies.study_result import SampleResult
 
@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from thud.studies.kind import RunOptions
-    from thud.studies.samples import SampleStudy
+    from thud.studies.run import RunOptions
     from thud.studies.study import Source
 
 INDICES = {
@@ -38,7 +37,7 @@ RESAMPLES = 200
 _ROUNDING = 1e-24
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Sensitivity(SampleResult):
     """Sobol indices of a study.
 
@@ -54,9 +53,18 @@ class Sensitivity(SampleResult):
         Number of base samples left out because one of their samples has no result.
     """
 
+    kind: ClassVar[str] = "sensitivity"
+    table_ending: ClassVar[str] = "_indices.csv"
+
     dataset: xr.Dataset
-    indices: xr.Dataset
-    left_out: int
+    indices: xr.Dataset = field(init=False)
+    left_out: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Compute the indices; raise InputError if too few base samples have results."""
+        indices, left_out = _indices(self.dataset)
+        object.__setattr__(self, "indices", indices)
+        object.__setattr__(self, "left_out", left_out)
 
     def __repr__(self) -> str:
         """Return parameters and outputs."""
@@ -100,30 +108,6 @@ def _index_text(index: float, half_width: float) -> str:
     return f"{index:z.2f} ± {math.ceil(100 * half_width) / 100:.2f}"
 
 
-class SensitivityKind(SampleKind[Sensitivity]):
-    """Sensitivity as a kind of study."""
-
-    name = "sensitivity"
-    designs = ("saltelli",)
-
-    def new_result(self, study: SampleStudy, dataset: xr.Dataset) -> Sensitivity:
-        """Return the Sobol indices of all samples."""
-        return _indices(study, dataset.load())
-
-    def listed_files(self, study: SampleStudy) -> list[str]:
-        """Return the names of figures and table."""
-        return [*super().listed_files(study), f"{study.name}_indices.csv"]
-
-    def files(self, result: Sensitivity, study: SampleStudy) -> dict[str, bytes]:
-        """Return the table of all indices."""
-        table = result.to_dataframe()
-        text = table.to_csv(float_format="%.6g", na_rep="nan", lineterminator="\n")
-        return {f"{study.name}_indices.csv": text.encode()}
-
-
-KIND = SensitivityKind()
-
-
 def sensitivity(
     study: Source, output: str | os.PathLike[str] | None = None, **options: Unpack[RunOptions]
 ) -> Sensitivity:
@@ -133,55 +117,56 @@ def sensitivity(
     samples are computed for d parameters. Arguments and errors are those of `sweep`; InputError is
     also raised if too few samples have results.
     """
-    return KIND.run(study, output, **options)
+    return compute(Sensitivity, study, output, **options)
 
 
-def _indices(study: SampleStudy, dataset: xr.Dataset) -> Sensitivity:
-    force = study.case.levels.force
-    levels = dataset[f"{force}_octave"].to_numpy()
-    peak = "peak_elastic_force" if force == "elastic" else "peak_force"
-    outputs = {f"level {band:g} Hz": levels[:, i] for i, band in enumerate(get_bands().nominal)}
-    outputs |= {name.replace("_", " "): dataset[name].to_numpy() for name in ("contact_time", peak)}
-    # Quantities of drops on a floor.
-    on_floor = (name for name in ("floor_work", "room_rating") if name in dataset)
-    outputs |= {name.replace("_", " "): dataset[name].to_numpy() for name in on_floor}
-    dimension = len(study.parameters)
+def _indices(dataset: xr.Dataset) -> tuple[xr.Dataset, int]:
+    """Return the Sobol indices of a dataset, and the number of base samples that are left out."""
+    parameters = dataset.attrs["parameters"].split()
+    dimension, seed = len(parameters), int(dataset.attrs["seed"])
     usable = (dataset["status"].to_numpy() == 0).reshape(-1, dimension + 2).all(axis=1)
     if usable.sum() < MIN_BASE_SAMPLES:
         reason = next(text for text in dataset["reason"].to_numpy() if text)
         refuse(
-            f"only {usable.sum()} of {study.size} base samples have results ({reason})",
+            f"only {usable.sum()} of {usable.size} base samples have results ({reason})",
             "ranges in which samples have results",
         )
-    rows = np.repeat(usable, dimension + 2)
-    result = [sobol_indices(values[rows], dimension, study.seed) for values in outputs.values()]
+    samples = dataset.isel(sample=np.repeat(usable, dimension + 2))
+    force = dataset.attrs["assessed_force"]
+    peak = "peak_elastic_force" if force == "elastic" else "peak_force"
+    levels = f"{force}_octave"
+    outputs = {
+        f"level {band:g} Hz": samples[levels].to_numpy()[:, i]
+        for i, band in enumerate(get_bands().nominal)
+    }
+    # The last two are quantities of drops on a floor.
+    names = [n for n in ("contact_time", peak, "floor_work", "room_rating") if n in samples]
+    outputs |= {name.replace("_", " "): samples[name].to_numpy() for name in names}
+    result = [sobol_indices(values, dimension, seed) for values in outputs.values()]
     variables: dict[str, Any] = {
         name: (("output", "parameter"), np.stack(values), {"units": "1", "long_name": meaning})
         for (name, meaning), values in zip(INDICES.items(), zip(*result, strict=True), strict=True)
     }
-    if study.surrogate:
+    if "surrogate" in dataset.attrs:
         meaning = {
             "units": "1",
             "long_name": "variance of the surrogate's errors divided by that of the output",
         }
-        learned = (f"{force}_octave", "contact_time", peak)
-        errors = np.concatenate([study.surrogate.mean_square(name) for name in learned])
+        errors = np.concatenate(
+            [np.atleast_1d(dataset[name].attrs["surrogate_variance"]) for name in (levels, *names)]
+        )
         # The errors of all quantities are in dB.
         spread = np.array(
             [
-                np.var(v[rows] if i < levels.shape[1] else 20 * np.log10(v[rows]))
-                for i, v in enumerate(outputs.values())
+                np.var(v if name.startswith("level") else 20 * np.log10(v))
+                for name, v in outputs.items()
             ]
         )
         # NaN for outputs that do not vary, like the indices.
         spread[spread <= _ROUNDING] = np.nan
         variables["surrogate"] = ("output", errors / spread, meaning)
-    names = {
-        "output": list(outputs),
-        "parameter": [parameter.coordinate_name for parameter in study.parameters],
-    }
-    left_out = int((~usable).sum())
-    return Sensitivity(dataset, xr.Dataset(variables, names, dataset.attrs), left_out)
+    coordinates = {"output": list(outputs), "parameter": parameters}
+    return xr.Dataset(variables, coordinates, dataset.attrs), int((~usable).sum())
 
 
 def sobol_indices(

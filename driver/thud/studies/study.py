@@ -3,43 +3,55 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
-from hashlib import sha256
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
-from thud.base._schema import MODELS
+from thud.base._schema import MODELS, FiniteElement
 from thud.base.bridge import version
-from thud.base.checks import refuse, refuse_unknown, refuse_value, require_kind, shown
+from thud.base.checks import (
+    refuse,
+    refuse_unknown,
+    refuse_value,
+    require_choice,
+    require_kind,
+    shown,
+)
 from thud.base.errors import InputError
 from thud.base.toml_tables import read_toml
-from thud.case.case import (
-    Case,
-    check_case,
-    impact_only,
-    new_model,
-    read_case,
-)
-from thud.case.keys import DENSITY, TEMPERATURE, find_key, with_values
-from thud.studies.parameter import Parameter, read_quantity, read_value
+from thud.case.case import Case, check_case, impact_only, new_model, read_case
+from thud.case.keys import DENSITY, TEMPERATURE, find_key, value_in, with_values
+from thud.studies.kinds import KINDS
+from thud.studies.parameter import Parameter, read_quantity, read_value, read_varied
+from thud.studies.sampling import read_design, sampler_versions, unit_samples
+from thud.studies.temperature import read_temperature
+from thud.studies.trained_surrogate import get_surrogate, stated_surrogate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
+    from numpy.typing import NDArray
+
+    from thud.studies.temperature import Temperature
+    from thud.studies.trained_surrogate import Surrogate
+
+    Columns = dict[str, NDArray[Any]]
+
 # Types that a study is read from.
 Source: TypeAlias = "str | os.PathLike[str] | Mapping[str, object] | Study"
 
-# Keys and tables that every study may have.
+# Keys and tables that every study may have, and those of studies of samples.
 COMMON_KEYS = ("name", "case", "fixed", "parameters")
-# Texts that are longer than this are shortened to their beginning and a checksum.
-_MAX_LENGTH = 300
-# Quantiles of the parameters for trial cases.
-TRIAL_QUANTILES = (0.01, 0.5, 0.99)
+_SAMPLE_KEYS = ("design", "temperature", "surrogate")
+# Numbers of samples in a block, which takes some tenths of a second, of elements more: predicted by
+# a surrogate, by the batch of shells, by other models, and by elements.
+_SURROGATE_BLOCK_SIZE, _BATCH_BLOCK_SIZE, _BLOCK_SIZE, _ELEMENT_BLOCK_SIZE = 2**16, 2**14, 32, 1
 
 
 @dataclass(frozen=True)
@@ -62,6 +74,14 @@ class Study:
         Text of the study file.
     inputs : tuple of path-like
         Files that the study is read from.
+    design : str
+        ``"grid"``, ``"list"``, ``"random"``, ``"latin_hypercube"``, ``"sobol"`` or ``"saltelli"``.
+    size, seed : int
+        Number of random samples (of base samples for ``"saltelli"``), and the seed.
+    temperature : Temperature or None
+        How the material depends on temperature, if the temperature is a parameter.
+    surrogate : Surrogate or None
+        Surrogate that predicts the samples instead of the model.
     """
 
     name: str
@@ -71,40 +91,130 @@ class Study:
     density: float | None = None
     text: str = field(default="", compare=False, repr=False)
     inputs: tuple[str | os.PathLike[str], ...] = field(default=(), compare=False, repr=False)
+    design: str = "grid"
+    size: int = 0
+    seed: int = 0
+    temperature: Temperature | None = None
+    surrogate: Surrogate | None = None
 
     @property
     def model(self) -> str:
         """Name of the source model."""
-        return self.case.model.name  # type: ignore[union-attr]
+        return self.case.model.name if self.case.model else ""
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of values of each parameter in a grid; for other designs the number of samples."""
+        if self.design in {"grid", "list"}:
+            sizes = tuple(parameter.size for parameter in self.parameters)
+            return sizes if self.design == "grid" else sizes[:1]
+        per_base = len(self.parameters) + 2 if self.design == "saltelli" else 1
+        return (self.size * per_base,)
+
+    @property
+    def count(self) -> int:
+        """Number of samples."""
+        return math.prod(self.shape)
+
+    @property
+    def block_size(self) -> int:
+        """Number of samples that are computed together, the same for all executors."""
+        if self.surrogate:
+            return _SURROGATE_BLOCK_SIZE
+        if self.model == "finite_element":
+            return _ELEMENT_BLOCK_SIZE
+        is_batch = not self.case.floor and self.case.levels.method == "exact"
+        return _BATCH_BLOCK_SIZE if self.model == "hollow_sphere" and is_batch else _BLOCK_SIZE
 
     @property
     def identity(self) -> dict[str, str]:
-        """Version and settings on which the results depend, as texts by group and key."""
-        result = {"thud": version(), "kind": self.kind, **self.kind_settings()}
-        result["[parameters]"] = ", ".join(p.name for p in self.parameters)
+        """Versions and settings on which the results depend, as texts by group and key."""
+        result = {"thud": version(), "kind": self.kind, **sampler_versions(self.design)}
+        result["[design]"] = f"{self.design}, size {self.size}, seed {self.seed}"
+        result["[parameters]"] = ", ".join(parameter.name for parameter in self.parameters)
         result |= {f"[parameters] {p.name}": str(p) for p in self.parameters}
+        if self.temperature:
+            result["[temperature]"] = f"{self.temperature}"
+        if self.surrogate:
+            result["surrogate"] = self.surrogate.digest
         if self.density is not None:
             result["[fixed] density"] = f"{self.density!r} kg/m3"
         for group, keys in self.case.resolved().to_namelist().items():
             result |= {f"&{group}: {key}": f"{value!r}" for key, value in keys.items()}
-        return {key: _shortened(value) for key, value in result.items()}
+        # Blocks of another size would overlap or leave gaps.
+        return {**result, "samples in a block": f"{self.block_size}"}
 
-    def trial_case(self, quantile: float) -> Case:
-        """Return the case with its parameters at a quantile; raise InputError if it is invalid."""
-        varied = (p for p in self.parameters if p.key not in {DENSITY, TEMPERATURE})
-        result = {p.name: p.trial(quantile) for p in varied}
-        case = with_values(self.case, {name: v for name, v in result.items() if v is not None})
-        return case if self.density is None else with_density(case, self.density)
+    def parameter_columns(self, start: int, stop: int) -> Columns:
+        """Return values of samples `start` to `stop` - 1 by parameter, shape (n_sample,)."""
+        if self.design == "grid":
+            indices = np.unravel_index(np.arange(start, stop), self.shape)
+            return {p.name: p.grid()[i] for p, i in zip(self.parameters, indices, strict=True)}
+        if self.design == "list":
+            return {p.name: p.grid()[start:stop] for p in self.parameters}
+        fractions = unit_samples(
+            self.design, len(self.parameters), self.size, self.seed, start, stop
+        )
+        return {p.name: p.quantiles(fractions[:, i]) for i, p in enumerate(self.parameters)}
 
-    def kind_settings(self) -> dict[str, str]:
-        """Return the settings of this kind of study on which its results depend."""
-        return {}
+    def key_columns(self, columns: Columns) -> Columns:
+        """Return samples of `parameter_columns` as values of keys, shape (n_sample,).
+
+        The density determines the mass; the temperature determines modulus and loss factor.
+        """
+        result = dict(columns)
+        density = result.pop(DENSITY.name, self.density)
+        if density is not None:
+            ball = vars(self.case.resolved().ball) | result
+            volume = wall_volume(ball["outer_radius"], ball["wall_thickness"])
+            result["mass"] = density * volume * np.ones(len(next(iter(columns.values()))))
+        return self.temperature.apply(self.case, result) if self.temperature else result
 
 
-def _shortened(text: str) -> str:
-    if len(text) <= _MAX_LENGTH:
-        return text
-    return f"{text[:_MAX_LENGTH]}... ({sha256(text.encode()).hexdigest()[:16]})"
+def read_study(source: Source, kind: str = "sweep", case: Case | None = None) -> Study:
+    """Read a study of samples.
+
+    Parameters
+    ----------
+    source
+        Path of a TOML file, or its content as a mapping, see docs/studies.md; a mapping of names of
+        keys to lists or `Parameter` is the table ``[parameters]``.
+    kind
+        ``"sweep"``, ``"sensitivity"``, ``"design"`` or ``"uncertainty"``.
+    case
+        The case, if the study states none.
+
+    Returns
+    -------
+    Study
+        The study, complete and checked.
+
+    Raises
+    ------
+    InputError
+        If the study is invalid; the message names file, table, key and what is allowed.
+    """
+    require_choice("kind", kind, KINDS)
+    if isinstance(source, Study):
+        if source.kind != kind:
+            refuse(f"{source.name} is a {source.kind} study", f"a {kind} study")
+        return source
+    with read_tables(source) as (content, folder, text):
+        study = read_common(content, folder, kind, _SAMPLE_KEYS, _read_parameter, case)
+        own = () if isinstance(source, Mapping) else (source,)
+        study = replace(
+            study,
+            case=_without_files(study.case),
+            text=text,
+            inputs=(*own, *named_files(content, folder)),
+            **read_design(table_of(content, "design"), KINDS[kind].designs, study.parameters),
+        )
+        if TEMPERATURE.name in {*content, *(parameter.name for parameter in study.parameters)}:
+            law = read_temperature(content.get("temperature"), study.case, study.parameters)
+            study = replace(study, temperature=law)
+        if "surrogate" in content:
+            surrogate = stated_surrogate(table_of(content, "surrogate"), folder)
+            study = with_surrogate(study, surrogate)
+        return study
 
 
 @contextmanager
@@ -113,6 +223,12 @@ def read_tables(
 ) -> Iterator[tuple[dict[str, Any], Path, str]]:
     """Yield tables, folder and text of a study; InputErrors within the block name its file."""
     if isinstance(source, Mapping):
+        if source and not {*source} & {*COMMON_KEYS, *_SAMPLE_KEYS, "target"}:
+            entries = {
+                name: entry if isinstance(entry, Mapping | Parameter) else {"values": entry}
+                for name, entry in source.items()
+            }
+            source = {"parameters": entries}
         text = _text(source)
         yield {"name": "python", **json.loads(text)}, Path(), text
         return
@@ -123,17 +239,6 @@ def read_tables(
         yield {"name": path.stem, **content}, path.parent, text
     except InputError as error:
         raise error.within(path) from error
-
-
-def named_files(value: object, folder: Path) -> Iterator[Path]:
-    """Yield the existing files that a study names by paths relative to a folder."""
-    if isinstance(value, str):
-        with suppress(OSError, ValueError):
-            if (folder / value).is_file():
-                yield folder / value
-    elif isinstance(value, Mapping | list):
-        for entry in value.values() if isinstance(value, Mapping) else value:
-            yield from named_files(entry, folder)
 
 
 def _text(source: Mapping[str, object]) -> str:
@@ -150,38 +255,44 @@ def _text(source: Mapping[str, object]) -> str:
 
 def _plain(value: object) -> object:
     """Return tables, paths, and NumPy numbers and arrays in types of JSON."""
-    if isinstance(value, Parameter):
-        return value.table
-    if isinstance(value, Mapping):
-        return dict(value)
-    if isinstance(value, np.generic | np.ndarray):
-        return value.tolist()
-    if isinstance(value, os.PathLike):
-        return os.fspath(value)
+    if isinstance(value, Parameter | Mapping):
+        return value.table if isinstance(value, Parameter) else dict(value)
+    if isinstance(value, np.generic | np.ndarray | os.PathLike):
+        return os.fspath(value) if isinstance(value, os.PathLike) else value.tolist()
     message = f"an object of {type(value).__name__}"
     raise TypeError(message)
 
 
-def read_common(
+def named_files(value: object, folder: Path) -> Iterator[Path]:
+    """Yield the existing files that a study names by paths relative to a folder."""
+    if isinstance(value, str):
+        with suppress(OSError, ValueError):
+            if (folder / value).is_file():
+                yield folder / value
+    elif isinstance(value, Mapping | list):
+        for entry in value.values() if isinstance(value, Mapping) else value:
+            yield from named_files(entry, folder)
+
+
+def read_common(  # noqa: PLR0913, PLR0917 - tables, their names, and how parameters are read
     content: dict[str, Any],
     folder: Path,
     kind: str,
     own_keys: Iterable[str],
     new_parameter: Callable[[str, object, Case, float | None], Parameter],
+    case: Case | None = None,
 ) -> Study:
-    """Read the part that all kinds share; `own_keys` are those besides `COMMON_KEYS`."""
+    """Read the part that studies and fits share; `own_keys` are those besides `COMMON_KEYS`."""
     refuse_unknown("the study", content, (*COMMON_KEYS, *own_keys))
     fixed, parameters = (table_of(content, name) for name in ("fixed", "parameters"))
     check_case(Case(name=content["name"]))
-    name = content["name"].rstrip()
-    case, density = fix_keys(_case(content.get("case"), folder, fixed), fixed)
+    case = _read_case(content.get("case"), folder, fixed, case)
+    case, density = fix_keys(case, fixed)
     if not parameters:
         refuse("[parameters] is empty", "one parameter or more")
-    result = tuple(new_parameter(name, entry, case, density) for name, entry in parameters.items())
+    varied = tuple(new_parameter(name, entry, case, density) for name, entry in parameters.items())
     _require_use(fixed, parameters)
-    study = Study(name, kind, case, result, density)
-    _require_valid(study, fixed)
-    return study
+    return Study(content["name"].rstrip(), kind, case, varied, density)
 
 
 def table_of(content: Mapping[str, Any], name: str) -> dict[str, Any]:
@@ -192,20 +303,22 @@ def table_of(content: Mapping[str, Any], name: str) -> dict[str, Any]:
     return table
 
 
-def _case(path: object, folder: Path, fixed: Mapping[str, Any]) -> Case:
-    if not isinstance(path, str | Mapping | None):
-        refuse_value("case", path, "the path of a namelist file, or tables of its groups")
-    if isinstance(path, Mapping):
-        case = Case.from_namelist(path)
-    else:
-        case = Case() if path is None else read_case(folder / path)
+def _read_case(entry: object, folder: Path, fixed: Mapping[str, Any], case: Case | None) -> Case:
+    """Return the case of a study: a namelist file, tables of groups, or an object."""
+    if not isinstance(entry, str | Mapping | None) or (entry is not None and case is not None):
+        refuse_value("case", entry, "the path of a namelist file, tables of its groups, or case=")
+    if isinstance(entry, Mapping):
+        case = Case.from_namelist(entry)
+    elif entry is not None:
+        case = read_case(folder / entry)
+    case = case or Case()
     if (model := fixed.get("model")) is not None:
         if not isinstance(model, str):
             refuse_value("[fixed] model", model, ", ".join(MODELS))
         if case.model is None or model != case.model.name:
             case = replace(case, model=new_model(model, {}))
     if case.model is None:
-        refuse(f"case = {shown(path)} has no source model", "a case with a source model")
+        refuse(f"case = {shown(entry)} has no source model", "a case with a source model")
     return case
 
 
@@ -231,6 +344,14 @@ def fix_keys(
     return with_values(case, values), density  # type: ignore[return-value]
 
 
+def _read_parameter(name: str, entry: object, case: Case, density: float | None) -> Parameter:
+    """Return a parameter that varies."""
+    if name == "bands":
+        refuse("[parameters] bands is not allowed", "bands in [fixed], the same for all samples")
+    mean = density if name == DENSITY.name else value_in(case, name)
+    return read_varied(name, entry, case, mean)
+
+
 def _require_use(fixed: Mapping[str, Any], parameters: Mapping[str, Any]) -> None:
     """Raise InputError if one key overrides another."""
     if {"mass", DENSITY.name} <= {*fixed, *parameters}:
@@ -244,19 +365,23 @@ def _require_use(fixed: Mapping[str, Any], parameters: Mapping[str, Any]) -> Non
             )
 
 
-def _require_valid(study: Study, fixed: Mapping[str, Any]) -> None:
-    """Raise InputError if a fixed value is invalid for all values of the parameters."""
-    keys = {name.partition("(")[0] for name in fixed} | ({"mass"} if study.density else set())
-    errors = []
-    for quantile in TRIAL_QUANTILES:
-        try:
-            check_case(impact_only(study.trial_case(quantile)))
-        except InputError as error:
-            errors.append(error)
-    named = [error.note.subject.rpartition(".")[2] for error in errors if error.note]
-    if len(named) == len(TRIAL_QUANTILES) and keys.issuperset(named):
-        place = "[fixed]"
-        raise errors[0].within(place) from errors[0]
+def _without_files(case: Case) -> Case:
+    """Return a case of an impact alone, which writes no snapshots."""
+    case = impact_only(case)
+    model = case.model
+    if not isinstance(model, FiniteElement):
+        return case
+    return replace(case, model=replace(model, snapshot_interval=0.0))
+
+
+def with_surrogate(study: Study, surrogate: Surrogate | str | os.PathLike[str]) -> Study:
+    """Return a study whose samples a surrogate predicts; raise InputError if it cannot."""
+    if study.case.floor:
+        refuse("[surrogate] is not allowed with a floor", "a case without &floor")
+    trained = get_surrogate(surrogate)
+    trained.require(study.case, study.key_columns(study.parameter_columns(0, 1)))
+    files = (surrogate,) if isinstance(surrogate, str | os.PathLike) else ()
+    return replace(study, surrogate=trained, inputs=(*study.inputs, *files))
 
 
 def with_density(case: Case, density: float) -> Case:

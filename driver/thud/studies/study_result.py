@@ -1,72 +1,57 @@
-"""Results of studies."""
+"""Results of studies of samples."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, ClassVar
 
 from thud.base.display import Displayed
 from thud.base.tables import format_rows
-from thud.impact.datasets import NO_ERRORS, sample_warnings
+from thud.impact.datasets import FREQUENCIES, NO_ERRORS, sample_warnings
 
 if TYPE_CHECKING:
+    import os
+
+    import pandas as pd
     import xarray as xr
     from matplotlib.figure import Figure
 
     from thud.base.note import Note
+    from thud.studies.study import Study
 
 
-class StudyResult(Displayed):
-    """Result of a study: `rows` and `table`, `plot`, `warnings` and `notes`.
-
-    Attributes
-    ----------
-    warnings : tuple of Note or str
-        Reasons why numbers may be wrong or missing.
-    """
-
-    warnings: tuple[Note | str, ...]
-
-    @property
-    def notes(self) -> tuple[Note | str, ...]:
-        """Notes on what was done."""
-        return ()
-
-    @property
-    def succeeded(self) -> bool:
-        """Whether there is any result."""
-        return True
-
-    def table(self) -> str:
-        """Return the result as text."""
-        return format_rows(self.rows())
-
-    @abstractmethod
-    def plot(self) -> Figure:
-        """Return the figure of the result."""
-
-    def figures(self, name: str) -> dict[str, Figure]:
-        """Return all figures by the names of their files; `name` is the name of the study."""
-        return {name: self.plot()} if self.succeeded else {}
-
-
-class SampleResult(StudyResult):
-    """Result of a study of samples.
+class SampleResult(Displayed):
+    """Result of a study of samples, a function of their dataset.
 
     Attributes
     ----------
     dataset : Dataset
-        Every sample of the study.
+        Every sample of the study, as returned by `thud.studies.run.run`.
     """
+
+    # Kind of study, see `thud.studies.kinds.KINDS`.
+    kind: ClassVar[str]
+    # End of the name of a file with `to_dataframe`; empty: only the samples are written.
+    table_ending: ClassVar[str] = ""
 
     dataset: xr.Dataset
 
+    @abstractmethod
+    def __init__(self, dataset: xr.Dataset) -> None:
+        """Make the result from all samples."""
+
+    @classmethod
+    def check(cls, study: Study) -> None:
+        """Raise InputError for a study whose samples cannot have such a result."""
+
     @property
-    def warnings(self) -> tuple[Note, ...]:  # type: ignore[override]
+    def warnings(self) -> tuple[Note, ...]:
         """Samples without results and the most frequent reason, and sources without conformity."""
         data = self.dataset
-        conforms = data["conforms"].values if "room_rating" in data else None
-        return sample_warnings(data["status"].values, data["reason"].values, conforms)
+        names = ("status", "reason", "conforms")
+        status, reason, conforms = (data[name].to_numpy() for name in names)
+        return sample_warnings(status, reason, conforms if "room_rating" in data else None)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -79,9 +64,12 @@ class SampleResult(StudyResult):
 
     def table(self) -> str:
         """Return the result as text; it says that the samples of a model state no errors."""
-        if "surrogate" in self.dataset.attrs:
-            return super().table()
-        return f"{super().table()}\n{NO_ERRORS}"
+        table = format_rows(self.rows())
+        return table if "surrogate" in self.dataset.attrs else f"{table}\n{NO_ERRORS}"
+
+    @abstractmethod
+    def plot(self) -> Figure:
+        """Return the figure of the result."""
 
     @property
     def succeeded(self) -> bool:
@@ -91,3 +79,22 @@ class SampleResult(StudyResult):
     def to_xarray(self) -> xr.Dataset:
         """Return every sample, with units and provenance."""
         return self.dataset.copy()
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return a row for each sample; levels have a column for each band, Hz."""
+        columns: dict[str, xr.DataArray] = {}
+        for name, variable in self.dataset.data_vars.items():
+            bands = next((bands for bands in FREQUENCIES if bands in variable.dims), None)
+            for band in self.dataset[bands].to_numpy() if bands else ():
+                columns[f"{name}_{band:g}"] = variable.sel({bands: band}, drop=True)
+            if not bands:
+                columns[str(name)] = variable
+        return (
+            self.dataset[[]].drop_vars(FREQUENCIES, errors="ignore").assign(columns).to_dataframe()
+        )
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write every sample as NetCDF, which `thud.read_sweep` reads."""
+        from thud.studies.dataset import write_dataset
+
+        write_dataset(self.dataset, Path(path))

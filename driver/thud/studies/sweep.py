@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Unpack
+from typing import TYPE_CHECKING, ClassVar, Unpack
 
 from thud.impact.datasets import FREQUENCIES, RESULTS
-from thud.studies.blocks import read_dataset
-from thud.studies.sample_kind import SampleKind
+from thud.studies.dataset import read_dataset
+from thud.studies.run import compute
 from thud.studies.study_result import SampleResult
 
 if TYPE_CHECKING:
@@ -17,12 +17,11 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from thud.studies.kind import RunOptions
-    from thud.studies.samples import SampleStudy
+    from thud.studies.run import RunOptions
     from thud.studies.study import Source
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Sweep(SampleResult):
     """Results of all samples.
 
@@ -31,6 +30,8 @@ class Sweep(SampleResult):
     dataset : Dataset
         A grid has one dimension per parameter, other designs the dimension ``sample``.
     """
+
+    kind: ClassVar[str] = "sweep"
 
     dataset: xr.Dataset
 
@@ -63,20 +64,6 @@ class Sweep(SampleResult):
         return draw_sweep(self)
 
 
-class SweepKind(SampleKind[Sweep]):
-    """Sweeps as a kind of study."""
-
-    name = "sweep"
-    designs = ("grid", "list", "random", "latin_hypercube", "sobol")
-
-    def new_result(self, study: SampleStudy, dataset: xr.Dataset) -> Sweep:  # noqa: ARG002
-        """Return the results of all samples as they are."""
-        return Sweep(dataset)
-
-
-KIND = SweepKind()
-
-
 def sweep(
     study: Source, output: str | os.PathLike[str] | None = None, **options: Unpack[RunOptions]
 ) -> Sweep:
@@ -85,12 +72,13 @@ def sweep(
     Parameters
     ----------
     study
-        Path of a TOML file, or its content as a mapping; see docs/studies.md.
+        Path of a TOML file, or its content as a mapping, see docs/studies.md; or values by names of
+        keys, as for `thud.solve_many`, of which every combination is a sample.
     output
         Directory of the results; an interrupted study is continued. None: they are not written.
     **options
-        Keywords `workers`, `executor`, `allow_large`, `progress`, `replace`; see
-        `thud.studies.kind.RunOptions`.
+        Keywords `case`, `surrogate`, `workers`, `executor`, `allow_large`, `progress`, `replace`;
+        see `thud.studies.run.RunOptions`.
 
     Returns
     -------
@@ -108,11 +96,11 @@ def sweep(
 
     Examples
     --------
-    >>> result = sweep({"parameters": {"height": {"values": [50, 100], "unit": "cm"}}})
+    >>> result = sweep({"height": [0.5, 1.0]})
     >>> result.dataset["contact_time"].round(4).values.tolist()
     [0.0207, 0.0196]
     """
-    return KIND.run(study, output, **options)
+    return compute(Sweep, study, output, **options)
 
 
 def read_sweep(path: str | os.PathLike[str]) -> Sweep:
@@ -127,7 +115,7 @@ def read_sweep(path: str | os.PathLike[str]) -> Sweep:
     Returns
     -------
     Sweep
-        The results.
+        The results; ``thud.Sensitivity(result.dataset)`` is that of a sensitivity study.
 
     Raises
     ------

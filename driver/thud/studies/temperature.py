@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from thud.case.case import Case
     from thud.studies.parameter import Parameter
 
-_WORDS = ("reference", "coefficient", "c1", "c2")
 # Keys of the damping law, and the orders of laws other than the fractional one.
 _LAW_KEYS = ("viscosity", "damping_law")
 _ORDERS = {"kelvin_voigt": 1.0, "rising": 1.0}
@@ -36,21 +36,16 @@ class Temperature:
     ----------
     reference : float
         Temperature at which the keys of the case hold, degC.
-    coefficient : float or None
+    coefficient : float
         Coefficient of the modulus, 1/K.
-    c1, c2 : float or None
-        Constants of the shift, 1 and K.
+    c1, c2 : float
+        Constants of the shift, 1 and K; by default there is none.
     """
 
     reference: float
-    coefficient: float | None = None
-    c1: float | None = None
-    c2: float | None = None
-
-    @property
-    def table(self) -> dict[str, float]:
-        """Its table in a study."""
-        return {word: value for word, value in vars(self).items() if value is not None}
+    coefficient: float = 0.0
+    c1: float = 0.0
+    c2: float = math.inf
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -59,8 +54,6 @@ class Temperature:
 
     def shift(self, temperature: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the factor a of the frequency; NaN where c2 + T - reference <= 0."""
-        if self.c1 is None or self.c2 is None:
-            return np.ones_like(temperature)
         above = np.asarray(temperature, dtype=float) - self.reference
         with np.errstate(all="ignore"):
             power = np.where(self.c2 + above > 0, -self.c1 * above / (self.c2 + above), np.nan)
@@ -78,8 +71,8 @@ class Temperature:
         standard = case.resolved()
         values = {**vars(standard.ball), **vars(standard.model), **result}
         above = temperature - self.reference
-        modulus = values["youngs_modulus"] * (1 + (self.coefficient or 0.0) * above)
-        if self.c1 is not None:
+        modulus = values["youngs_modulus"] * (1 + self.coefficient * above)
+        if self.c1:
             order = _ORDERS.get(_loss_law(case), values["fractional_order"])
             angle = np.pi / 2 * order
             springpot = values["loss_factor"] / np.sin(angle) * self.shift(temperature) ** order
@@ -94,44 +87,33 @@ def _loss_law(case: Case) -> str:
     return next((options[key] for key in _LAW_KEYS if key in options), "none")
 
 
-def read_temperature(
-    table: object, case: Case, parameters: tuple[Parameter, ...]
-) -> Temperature | None:
-    """Return the temperature law of the table ``[temperature]``."""
-    varies = any(parameter.key == TEMPERATURE for parameter in parameters)
-    if varies != (table is not None):
+def read_temperature(table: object, case: Case, parameters: tuple[Parameter, ...]) -> Temperature:
+    """Return the law of the table ``[temperature]``, which a parameter of this name needs."""
+    names = {parameter.name for parameter in parameters}
+    if TEMPERATURE.name not in names or not isinstance(table, Mapping):
         refuse(
             "temperature needs both a parameter and the table [temperature]",
             "reference, degC, and coefficient, 1/K, or c1 and c2, K, in [temperature]",
         )
-    if not isinstance(table, Mapping):
-        return None
-    refuse_unknown("[temperature]", table, _WORDS)
-    shifts = ["c1", "c2"] if {"c1", "c2"} & set(table) else []
-    changes = ["coefficient"] if "coefficient" in table or not shifts else []
-    numbers = {}
-    for word in ["reference", *changes, *shifts]:
+    shifts = bool({"c1", "c2"} & table.keys())
+    refuse_unknown("[temperature]", table, ("reference", "coefficient", "c1", "c2"))
+    for word in ("reference", "c1", "c2") if shifts else ("reference", "coefficient"):
         if word not in table:
             refuse(f"[temperature] has no {word}", "reference with coefficient, or with c1 and c2")
-        numbers[word] = float(read_value(f"[temperature] {word}", TEMPERATURE, table[word], 0))
+    numbers = {
+        word: float(read_value(f"[temperature] {word}", TEMPERATURE, value, 0))
+        for word, value in table.items()
+    }
     for word in ("c1", "c2"):
         if numbers.get(word, 1.0) <= 0:
             refuse_value(f"[temperature] {word}", table[word], f"0 < {word}")
-    if "c1" in numbers:
-        _require_shift(case, parameters)
-    return Temperature(**numbers)
-
-
-def _require_shift(case: Case, parameters: tuple[Parameter, ...]) -> None:
-    """Raise InputError if the damping law cannot be shifted."""
     law = _loss_law(case)
-    names = {parameter.name for parameter in parameters}
-    varied = next((key for key in _LAW_KEYS if key in names), None)
-    if varied:
-        refuse(f"[temperature] c1 is not allowed if {varied} varies", f"{varied} in [fixed]")
-    if law not in {"fractional", *_ORDERS}:
+    if shifts and (varied := names & {*_LAW_KEYS}):
+        refuse(f"[temperature] c1 is not allowed if {min(varied)} varies", "it in [fixed]")
+    if shifts and law not in {"fractional", *_ORDERS}:
         refuse(
             f"[temperature] c1 cannot shift the loss of {case.model.name} ({law})",  # type: ignore[union-attr]
             "viscosity = 'fractional' or 'kelvin_voigt' of finite_element, damping_law = "
             "'fractional' or 'rising' of modal_ball",
         )
+    return Temperature(**numbers)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Unpack
+from typing import TYPE_CHECKING, ClassVar, Unpack
 
 import numpy as np
 
 from thud.base.checks import refuse
 from thud.level.assessment import octave_limits, wilson_interval
 from thud.level.levels import get_bands
-from thud.studies.sample_kind import SampleKind
+from thud.studies.run import compute
 from thud.studies.study_result import SampleResult
 
 if TYPE_CHECKING:
@@ -22,14 +22,11 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.base._schema import LimitsSource
-    from thud.case.case import Case
-    from thud.studies.kind import RunOptions
-    from thud.studies.parameter import Parameter
-    from thud.studies.samples import SampleStudy
-    from thud.studies.study import Source
+    from thud.studies.run import RunOptions
+    from thud.studies.study import Source, Study
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Uncertainty(SampleResult):
     """Distribution of the levels, and the probability of conformity.
 
@@ -37,24 +34,62 @@ class Uncertainty(SampleResult):
     ----------
     dataset : Dataset
         Every sample.
-    levels : ndarray, shape (n_sample, 5)
-        Octave levels of the assessed force, dB; samples without results are left out.
-    source : str
-        Source whose limits apply.
-    conforming, computed, failed : int
-        Samples that meet all criteria, that have results, and that have none.
     """
 
+    kind: ClassVar[str] = "uncertainty"
+
     dataset: xr.Dataset
-    levels: NDArray[np.float64]
-    source: LimitsSource
-    conforming: int
-    computed: int
-    failed: int
+
+    def __post_init__(self) -> None:
+        """Raise InputError if fewer than two samples have results."""
+        if self.computed < 2:  # noqa: PLR2004 - a spread needs two
+            reason = next((f" ({text})" for text in self.dataset["reason"].values if text), "")
+            count = self.dataset["status"].size
+            refuse(f"only {self.computed} of {count} samples have results{reason}", "two or more")
+
+    @classmethod
+    def check(cls, study: Study) -> None:
+        """Raise InputError for a study whose samples have different limits."""
+        for name in {parameter.name for parameter in study.parameters} & {"source", "force"}:
+            refuse(
+                f"[parameters] {name} is not allowed, because all samples have the same limits",
+                f"{name} in [fixed]",
+            )
 
     def __repr__(self) -> str:
         """Return how many samples conform."""
         return f"<Uncertainty, {self.source}: {self.conforming} of {self.computed} samples conform>"
+
+    @property
+    def levels(self) -> NDArray[np.float64]:
+        """Octave levels of the assessed force, dB, shape (n_sample, 5); not of failed samples."""
+        levels = self.dataset[f"{self.dataset.attrs['assessed_force']}_octave"]
+        return np.asarray(levels.values[self._is_computed])
+
+    @property
+    def source(self) -> LimitsSource:
+        """Source whose limits apply."""
+        source: LimitsSource = self.dataset.attrs["limits"]
+        return source
+
+    @property
+    def conforming(self) -> int:
+        """Number of samples that meet all criteria."""
+        return int(self.dataset["conforms"].values[self._is_computed].sum())
+
+    @property
+    def computed(self) -> int:
+        """Number of samples that have results."""
+        return int(self._is_computed.sum())
+
+    @property
+    def failed(self) -> int:
+        """Number of samples that have no results."""
+        return int((~self._is_computed).sum())
+
+    @property
+    def _is_computed(self) -> NDArray[np.bool_]:
+        return np.asarray(self.dataset["status"].values == 0)
 
     @property
     def probability(self) -> float:
@@ -89,17 +124,12 @@ class Uncertainty(SampleResult):
         rows: list[tuple[str, ...]] = [
             ("octave, Hz", "mean, dB", "std, dB", "2.5 to 97.5 %, dB", "within its limits")
         ]
-        for i, band in enumerate(get_bands().nominal):
-            level = self.levels[:, i]
-            low, high = np.quantile(level, [0.025, 0.975])
+        for i, (band, level) in enumerate(zip(get_bands().nominal, self.levels.T, strict=True)):
             share = np.mean((level >= lower[i]) & (level <= upper[i]))
-            spread = f"{level.std(ddof=1):.2f}", f"{low:.2f} to {high:.2f}"
-            rows.append((f"{band:g}", f"{level.mean():.2f}", *spread, f"{100 * share:.1f} %"))
+            rows.append((f"{band:g}", *_spread(level), f"{100 * share:.1f} %"))
         if "room_rating" in self.dataset:
-            rating = self.dataset["room_rating"].values[self.dataset["status"].values == 0]
-            low, high = np.quantile(rating, [0.025, 0.975])
-            spread = f"{rating.std(ddof=1):.2f}", f"{low:.2f} to {high:.2f}"
-            rows.append(("rating of the room", f"{rating.mean():.2f}", *spread, ""))
+            rating = self.dataset["room_rating"].to_numpy()[self._is_computed]
+            rows.append(("rating of the room", *_spread(rating), ""))
         low, high = self.interval
         probability = f"{100 * self.probability:.1f} %", f"± {100 * self.standard_error:.1f} %"
         interval = f"{100 * low:.1f} to {100 * high:.1f} %"
@@ -118,43 +148,10 @@ class Uncertainty(SampleResult):
         return draw_uncertainty(self)
 
 
-class UncertaintyKind(SampleKind[Uncertainty]):
-    """Uncertainty as a kind of study."""
-
-    name = "uncertainty"
-    designs = ("random",)
-
-    def new_parameter(
-        self, name: str, entry: object, case: Case, density: float | None
-    ) -> Parameter:
-        """Return a parameter that varies; limits must be the same for all samples."""
-        if name in {"source", "force"}:
-            refuse(
-                f"[parameters] {name} is not allowed, because all samples have the same limits",
-                f"{name} in [fixed]",
-            )
-        return super().new_parameter(name, entry, case, density)
-
-    def new_result(self, study: SampleStudy, dataset: xr.Dataset) -> Uncertainty:
-        """Return the distribution over all samples."""
-        dataset = dataset.load()
-        computed = dataset["status"].values == 0
-        if computed.sum() < 2:  # noqa: PLR2004 - a spread needs two
-            reason = next((f" ({text})" for text in dataset["reason"].values if text), "")
-            refuse(
-                f"only {computed.sum()} of {study.size} samples have results{reason}", "two or more"
-            )
-        return Uncertainty(
-            dataset,
-            dataset[f"{study.case.levels.force}_octave"].values[computed],
-            study.case.limits.source,
-            int(dataset["conforms"].values[computed].sum()),
-            int(computed.sum()),
-            int((~computed).sum()),
-        )
-
-
-KIND = UncertaintyKind()
+def _spread(values: NDArray[np.float64]) -> tuple[str, str, str]:
+    """Return mean, standard deviation and the range of 95 % as text."""
+    low, high = np.quantile(values, [0.025, 0.975])
+    return f"{values.mean():.2f}", f"{values.std(ddof=1):.2f}", f"{low:.2f} to {high:.2f}"
 
 
 def uncertainty(
@@ -165,4 +162,4 @@ def uncertainty(
     The parameters of the study are independent. Arguments and errors are those of `sweep`;
     InputError is also raised if fewer than two samples have results.
     """
-    return KIND.run(study, output, **options)
+    return compute(Uncertainty, study, output, **options)

@@ -1,0 +1,304 @@
+"""The engine of studies: samples in blocks, by threads or an executor, resumed where they are."""
+
+from __future__ import annotations
+
+import logging
+import os
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, TypedDict, TypeVar, Unpack
+
+from tqdm import tqdm
+
+from thud.base.bridge import api, version
+from thud.base.checks import refuse, refuse_unknown, require_whole, shown
+from thud.base.errors import NumericalError, ThudError
+from thud.base.extras import require_extra
+from thud.base.files import replace_file
+from thud.impact.ensemble import MAX_THREADS, solve_many
+from thud.studies.dataset import (
+    join_blocks,
+    new_dataset,
+    provenance_of,
+    read_dataset,
+    write_dataset,
+)
+from thud.studies.directory import open_directory, remove
+from thud.studies.study import read_study, with_surrogate
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    import xarray as xr
+
+    from thud.case.case import Case
+    from thud.studies.study import Columns, Source, Study
+    from thud.studies.study_result import SampleResult
+    from thud.studies.trained_surrogate import Surrogate
+
+R = TypeVar("R", bound="SampleResult")
+
+# Maximum number of samples without `allow_large`.
+MAX_SAMPLES = 100_000
+# Maximum time until a scheduler replies and has a worker, s.
+SCHEDULER_TIMEOUT = 5.0
+# Number of blocks that an executor of the caller has at a time: its width is not known.
+_SUBMITTED = 256
+
+
+class RunOptions(TypedDict, total=False):
+    """How a study is computed.
+
+    Attributes
+    ----------
+    workers : int or None
+        Number of threads; by default one per processor.
+    executor : concurrent.futures.Executor or None
+        Computes the samples instead, with the same results: processes, or machines by the
+        `get_executor` of a Dask client.
+    allow_large : bool
+        Allow any number of samples.
+    progress : bool
+        Show a progress bar.
+    replace : bool
+        Replace results of another version of the study, and files not written by thud.
+    case : Case or None
+        The case of a study that states none; by default the standard ball.
+    surrogate : Surrogate or str or None
+        Surrogate, or the path of its file, that predicts the samples instead of the model.
+    """
+
+    workers: int | None
+    executor: Executor | None
+    allow_large: bool
+    progress: bool
+    replace: bool
+    case: Case | None
+    surrogate: Surrogate | str | os.PathLike[str] | None
+
+
+def compute(
+    result: type[R],
+    source: Source,
+    output: str | os.PathLike[str] | None = None,
+    others: Iterable[str] = (),
+    **options: Unpack[RunOptions],
+) -> R:
+    """Return the result of a study, also written to a directory; see `thud.sweep` and `run`."""
+    refuse_unknown("keywords", options, RunOptions.__annotations__)
+    study = read_study(source, result.kind, options.get("case"))
+    if (surrogate := options.get("surrogate")) is not None:
+        study = with_surrogate(study, surrogate)
+    result.check(study)
+    tables = [f"{study.name}{result.table_ending}"] if result.table_ending else []
+    try:
+        computed = result(run(study, output, (*others, *tables), **options))
+    except MemoryError as error:
+        refuse(f"{study.count} samples do not fit in memory", "fewer samples", error)
+    if output is not None:
+        for name in tables:
+            table = computed.to_dataframe()
+            text = table.to_csv(float_format="%.6g", na_rep="nan", lineterminator="\n")
+            replace_file(Path(output, name), text.encode())
+    return computed
+
+
+def run(
+    study: Study,
+    path: str | os.PathLike[str] | None = None,
+    others: Iterable[str] = (),
+    **options: Unpack[RunOptions],
+) -> xr.Dataset:
+    """Return the results of all samples of a study; a sample that fails has a status and a reason.
+
+    With a directory, each block of samples is a file in ``NAME.partial`` as soon as it is done, and
+    ``NAME.nc`` has all of them in the end; finished blocks are not computed again.
+
+    Parameters
+    ----------
+    study
+        The study.
+    path
+        Directory of the results.
+    others
+        Names of files that the caller writes beside them.
+    **options
+        See `RunOptions`.
+
+    Raises
+    ------
+    InputError
+        If an option cannot be used, or files are in the way.
+    NumericalError
+        If the executor loses samples.
+    OSError
+        If results cannot be read or written.
+    """
+    if study.count > MAX_SAMPLES and not options.get("allow_large"):
+        refuse(describe(study), f"up to {MAX_SAMPLES} samples, or allow_large=True (--yes)")
+    # Raises InputError for a design that does not fit in memory.
+    study.parameter_columns(0, 1)
+    file = partial = None
+    if path is not None:
+        replace = options.get("replace", False)
+        file, partial = open_directory(path, study, others, replace=replace)
+        if file.exists():
+            remove(partial)
+            return read_dataset(file)
+        partial.mkdir(exist_ok=True)
+    starts = range(0, study.count, study.block_size)
+    missing = [s for s in starts if not (partial and _block(partial, s).exists())]
+    finished: dict[int, xr.Dataset] = {}
+    provenance = provenance_of(study)
+    with (
+        _executor(options) as (executor, limit),
+        tqdm(total=study.count, unit="sample", disable=not options.get("progress")) as bar,
+    ):
+        bar.update(study.count - sum(_stop(study, start) - start for start in missing))
+        for start, result in _compute(study, missing, executor, limit):
+            columns = study.parameter_columns(start, _stop(study, start))
+            block = new_dataset(study, columns, result, provenance)
+            if partial:
+                write_dataset(block, _block(partial, start))
+            else:
+                finished[start] = block
+            bar.update(block.sizes["sample"])
+    if file is None or partial is None:
+        return join_blocks(study, [finished[start] for start in starts])
+    blocks = [read_dataset(_block(partial, start)) for start in starts]
+    write_dataset(join_blocks(study, blocks), file)
+    remove(partial)
+    return read_dataset(file)
+
+
+def describe(study: Study) -> str:
+    """Return the number of samples of a study, and what computes them."""
+    by = f" by a surrogate of {len(study.surrogate.points)} drops" if study.surrogate else ""
+    return f"{study.name}: {study.count} samples of {study.model}{by}"
+
+
+def _block(partial: Path, start: int) -> Path:
+    """Return the file of the block that begins with a sample."""
+    return partial / f"block_{start:012d}.nc"
+
+
+def _stop(study: Study, start: int) -> int:
+    """Return the first sample after the block that begins with a sample."""
+    return min(start + study.block_size, study.count)
+
+
+@contextmanager
+def _executor(options: RunOptions) -> Iterator[tuple[Executor, int]]:
+    """Yield the executor, and the number of blocks that it has at a time."""
+    workers, executor = options.get("workers"), options.get("executor")
+    if executor is not None:
+        if workers is not None:
+            refuse(f"workers = {shown(workers)} with an executor", "none: it has its own workers")
+        yield executor, _SUBMITTED
+        return
+    if workers is not None:
+        require_whole("workers", workers, 1, MAX_THREADS)
+    width = workers or min(len(os.sched_getaffinity(0)), MAX_THREADS)
+    with ThreadPoolExecutor(width) as threads:
+        try:
+            yield threads, 2 * width
+        except KeyboardInterrupt:
+            threads.shutdown(wait=False, cancel_futures=True)
+            api.end_calls()
+            raise
+
+
+def _compute(
+    study: Study, starts: Iterable[int], executor: Executor, limit: int
+) -> Iterator[tuple[int, Columns]]:
+    """Yield the first sample of each block with its results, in the order in which they are done.
+
+    Raises NumericalError if the executor loses a block, after all blocks that are done.
+    """
+    waiting = iter(starts)
+    running: dict[Future[Columns], int] = {}
+    try:
+        while True:
+            for start in islice(waiting, limit - len(running)):
+                columns = study.parameter_columns(start, _stop(study, start))
+                block = study.case, study.key_columns(columns), version(), study.surrogate
+                running[executor.submit(evaluate, *block)] = start
+            if not running:
+                return
+            done, _ = wait(running, return_when=FIRST_COMPLETED)
+            for future in sorted(done, key=_is_lost):
+                yield running.pop(future), _result(future)
+    finally:
+        for future in running:
+            future.cancel()
+
+
+def _is_lost(future: Future[Columns]) -> bool:
+    return future.cancelled() or future.exception() is not None
+
+
+def _result(future: Future[Columns]) -> Columns:
+    """Return the results of a block; raise NumericalError if the executor has lost it."""
+    try:
+        return future.result()
+    except ThudError:
+        raise
+    except Exception as error:
+        reason = f"{type(error).__name__}: {error}".partition("\n")[0].removesuffix(": ")
+        message = (
+            f"the executor lost a block of samples ({reason}); finished samples are kept; "
+            "allowed: run the study again"
+        )
+        raise NumericalError(message) from error
+
+
+def evaluate(
+    case: Case, columns: Columns, required: str, surrogate: Surrogate | None = None
+) -> Columns:
+    """Return the results of samples by names as in `RESULTS`; NaN for a failed sample.
+
+    `columns` are the values, shape (n_sample,), of the keys in which samples differ from the case;
+    a surrogate replaces the model if there is one. Raise InputError if this is not the required
+    version of thud, that of the process which submits the samples.
+    """
+    if required != version():
+        refuse(
+            f"thud {version()} cannot compute samples of thud {required}",
+            "the same version everywhere",
+        )
+    if surrogate:
+        return surrogate.predict(case, columns)
+    results = solve_many(columns, case, threads=1).results
+    results["status"] = results["status"].astype("int8")
+    return results
+
+
+@contextmanager
+def dask_executor(address: str) -> Iterator[Executor]:
+    """Yield the executor of a Dask scheduler; raise InputError if it has no worker in time."""
+    with require_extra("dask"):
+        from distributed import Client
+    # Failures are raised as one message.
+    logging.disable(logging.CRITICAL)
+    try:
+        try:
+            client = Client(  # type: ignore[no-untyped-call]
+                address, timeout=SCHEDULER_TIMEOUT, set_as_default=False
+            )
+            client.wait_for_workers(1, timeout=SCHEDULER_TIMEOUT)
+        except (OSError, ValueError, TypeError) as error:
+            refuse(
+                f"scheduler = {shown(address)} has no worker within {SCHEDULER_TIMEOUT:g} s",
+                "the address of a running scheduler with workers, such as tcp://host:8786",
+                error,
+            )
+        with client:
+            executor = client.get_executor()  # type: ignore[no-untyped-call]
+            try:
+                yield executor
+            finally:
+                executor.shutdown(wait=False)
+    finally:
+        logging.disable(logging.NOTSET)
