@@ -6,21 +6,16 @@ import csv
 import html
 import json
 import re
-import sys
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-import xarray as xr
-from conftest import REPOSITORY, names_in, naming
+from conftest import REPOSITORY, names_in
 
 import thud
 from thud import cli
-from thud.base.errors import ReportWarning
 from thud.base.files import Results
-from thud.base.note import Note
-from thud.recordings.config import Instrument
 from thud.recordings.signal import Signal
 from thud.report import recording_files
 from thud.report.contents import criteria_data
@@ -33,7 +28,7 @@ if TYPE_CHECKING:
     from conftest import ErrorsOf
 
 FOLDER = REPOSITORY / "inputs/recordings"
-FILES = {"levels.csv", "criteria.csv", "recording.nc", "report.json"}
+FILES = {"levels.csv", "criteria.csv", "report.json"}
 FIGURES = {"report.html", "force.svg", "levels.svg"}
 
 
@@ -167,37 +162,6 @@ def test_page_that_fails_leaves_the_earlier_results(
     assert names(results.folder) == {"levels.csv"}
 
 
-def test_netcdf_holds_drops_levels_and_provenance(tmp_path: Path) -> None:
-    files = [FOLDER / f"drop_{i}.csv" for i in (1, 2, 3)]
-    recording = thud.read_recording(files, height=1.0, mass=2.5)
-    long = Note("plate_unknown", others={"what": "long " * 20000, "keys": ""})
-    drops = tuple(replace(drop, notes=(long,)) for drop in recording.drops)
-    instruments = ("plate", Instrument("amplifier", certificate="K-1"))
-    config = replace(recording.config, laboratory="Ωmega", instruments=instruments)
-    recording = replace(recording, drops=drops, config=config)
-    recording_files.save(recording, Results(tmp_path / "out", "measure"), figures=False)
-    with xr.open_dataset(tmp_path / "out/recording.nc") as found:
-        assert found.sizes == {"drop": 3, "octave": 5, "third": 15, "file": 3}
-        units = {"contact_time": "s", "restitution": "1", "peak_force": "N", "impulse": "N s"}
-        for name, unit in units.items():
-            estimates = [getattr(drop, name) for drop in recording.drops]
-            np.testing.assert_array_equal(found[name], [one.value for one in estimates])
-            doubts = [one.uncertainty for one in estimates]
-            np.testing.assert_array_equal(found[f"{name}_uncertainty"], doubts)
-            assert found[name].attrs["units"] == unit
-        quantities = [one.estimate for one in recording.assess().criteria[:5]]
-        expanded = [one.expanded for one in quantities]
-        np.testing.assert_array_equal(found["octave_level_expanded"], expanded)
-        np.testing.assert_array_equal(found["third_level"], recording.levels("third"))
-        np.testing.assert_array_equal(found["octave_drop_level"], recording.average().drops.level)
-        assert list(found["file_sha256"].values) == [one.checksum for one in recording.origins]
-        assert found.attrs["verdict"] == recording.assess().conforms
-        assert found.attrs["thud"] == thud.__version__
-        assert found.attrs["laboratory"].startswith("Ωmega")
-        assert found.attrs["instruments"] == "plate\namplifier, K-1"
-        assert len(found.attrs["warnings"]) > 100_000
-
-
 @pytest.mark.usefixtures("working_directory")
 def test_screen_lists_what_the_report_misses(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -214,16 +178,3 @@ def test_screen_lists_what_the_report_misses(
     assert "number of the report" not in line
     assert cli.main([*command, "--no-figures", "-o", "without"]) == 0
     assert "Missing in the report" not in capsys.readouterr().out
-
-
-def test_without_h5netcdf_a_warning_tells_what_is_left_out(
-    noisy: thud.Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    results = Results(tmp_path / "out", "measure")
-    recording_files.save(noisy, results, figures=False)
-    assert names(results.folder) == FILES
-    monkeypatch.setitem(sys.modules, "h5netcdf", None)
-    monkeypatch.delitem(sys.modules, "thud.report.netcdf")
-    with pytest.warns(ReportWarning, match=naming("recording.nc", "h5netcdf", "pip install")):
-        recording_files.save(noisy, results, figures=False)
-    assert names(results.folder) == FILES - {"recording.nc"}

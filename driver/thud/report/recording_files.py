@@ -13,8 +13,7 @@ from thud.base._schema import VERDICTS
 from thud.base.bridge import version
 from thud.base.checks import refuse, require_kind, shown_text
 from thud.base.display import draw_all, warn_if_not_drawn
-from thud.base.errors import InputError, ReportWarning
-from thud.base.extras import require_extra
+from thud.base.errors import ReportWarning
 from thud.base.files import Results, read_input
 from thud.base.tables import csv_text, marked
 from thud.level.estimate import UNKNOWN, Estimate
@@ -33,7 +32,7 @@ if TYPE_CHECKING:
 _SHOWN = ("Criterion", "Value", "U (95 %)", "Limits", "Margin", "Verdict")
 # Verdicts of several criteria.
 _PLURALS = {VERDICTS[0]: "conform", VERDICTS[1]: "do not conform"}
-LEVELS, CRITERIA, JSON, DATASET = "levels.csv", "criteria.csv", "report.json", "recording.nc"
+LEVELS, CRITERIA, JSON = "levels.csv", "criteria.csv", "report.json"
 HTML, PDF, STAGES = "report.html", "report.pdf", "stages"
 # Names of the figures of the page.
 FIGURES: tuple[Literal["force", "levels"], ...] = ("force", "levels")
@@ -143,7 +142,7 @@ def criteria_csv(data: dict[str, Any]) -> str:
 def file_names(*, figures: bool = True, stages: bool = False) -> list[str]:
     """Return the names of the files that `save` writes."""
     page = [HTML, PDF, *(f"{name}.svg" for name in FIGURES)] if figures else []
-    return [LEVELS, CRITERIA, JSON, DATASET, *page, *([f"{STAGES}.svg"] if stages else [])]
+    return [LEVELS, CRITERIA, JSON, *page, *([f"{STAGES}.svg"] if stages else [])]
 
 
 def write_report(
@@ -192,7 +191,6 @@ def save(
         LEVELS: levels_csv(data).encode(),
         CRITERIA: criteria_csv(data).encode(),
         JSON: json_bytes(data),
-        **_dataset(data, folder),
     }
     if figures and _has_matplotlib():
         drawings = draw_figures(recording)
@@ -254,17 +252,6 @@ def _has_matplotlib() -> bool:
 
         return bool(mpl.__version__)
     return False
-
-
-def _dataset(data: dict[str, Any], folder: Path) -> dict[str, bytes]:
-    try:
-        with require_extra("studies"):
-            from thud.report.netcdf import netcdf
-    except InputError as error:
-        message = f"{folder}: {DATASET} is not written: {error}"
-        warnings.warn(message, ReportWarning, stacklevel=3)
-        return {}
-    return {DATASET: netcdf(data)}
 
 
 def _checksums(data: dict[str, Any]) -> list[str]:
