@@ -190,7 +190,7 @@ def run_history(options: argparse.Namespace) -> int:
     from thud.report.ball_history import read_history
     from thud.report.ball_history_figure import draw_history
 
-    history = read_history(options.reports, different_balls=options.different_balls)
+    history = read_history(options.reports)
     results = results_of(options, "history", options.reports)
     contents = figures_of(options, {"history": partial(draw_history, history)})
     parts = [history.title, format_rows(history.table()), history.marks(), *history.warnings()]
@@ -203,7 +203,6 @@ HISTORY = Command(
         files("reports", "REPORT", "report.json files, or directories with such files",
               "calibration report", "directory", nargs="+"),
         *output("the chart (default: outputs/history)"),
-        flag("--different-balls", "allow reports of different balls"),
         QUIET,
     ),
     run_history,

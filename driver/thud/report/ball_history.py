@@ -20,7 +20,7 @@ from thud.base.files import read_input
 from thud.base.immutable import Immutable
 from thud.recordings.words import read_date
 from thud.report.contents import FORMAT
-from thud.report.rows import NOT_KNOWN, capital, number, quantity_of, value_text
+from thud.report.rows import capital, number, quantity_of, value_text
 
 if TYPE_CHECKING:
     import os
@@ -65,9 +65,6 @@ class Trend(Immutable):
         Whether the slope is significant, at 5 % for all criteria together.
     time, value : ndarray, shape (2,)
         Times of the first and the last value, years since the first report, and the line there.
-    reached, earliest, latest : float
-        Time between first and last value at which the line reaches a limit, and its interval
-        (95 %), years since the first report; NaN if there is none or the trend is not significant.
     """
 
     slope: float
@@ -75,9 +72,6 @@ class Trend(Immutable):
     significant: bool
     time: NDArray[np.float64]
     value: NDArray[np.float64]
-    reached: float = math.nan
-    earliest: float = math.nan
-    latest: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -155,12 +149,6 @@ class History:
     reports: tuple[dict[str, Any], ...]
 
     @property
-    def balls(self) -> tuple[str, ...]:
-        """Name and serial number of the ball of each report, shape (n_report,); empty if one."""
-        names = [_ball(report) or NOT_KNOWN for report in self.reports]
-        return tuple(names) if len(set(names)) > 1 else ()
-
-    @property
     def years(self) -> NDArray[np.float64]:
         """Time since the first report, years, shape (n_report,)."""
         return np.array([(date - self.dates[0]) / YEAR for date in self.dates])
@@ -209,22 +197,19 @@ class History:
         return sorted(date for date in dates if date and self.dates[0] <= date <= self.dates[-1])
 
     def table(self) -> list[tuple[str, ...]]:
-        """Return rows of text: values by date, change per year and date of the limit."""
+        """Return rows of text: values by date, and change per year."""
         count = len(self.dates)
         shown = [i for i in range(count) if i == 0 or i > count - MAX_COLUMNS]
 
-        def row(title: str, cells: Sequence[str], *trend: str) -> tuple[str, ...]:
-            return (title, *(cells[i] for i in shown), *(trend or ("", "")))
+        def row(title: str, cells: Sequence[str], trend: str = "") -> tuple[str, ...]:
+            return (title, *(cells[i] for i in shown), trend)
 
         days = [date.date().isoformat() for date in self.dates]
-        rows = [row("", days, "per year", "limit on")]
-        if self.balls:
-            rows.append(row("Ball", self.balls))
+        rows = [row("", days, "per year")]
         for series in self.series:
             cells = [value_text(entry) + MARKS[entry["verdict"]] for entry in series.entries]
             slope = series.slope_text + SIGNIFICANT * series.is_drifting
-            reached = series.trend and self._date_text(series.trend.reached)
-            rows.append(row(series.title, cells, slope, reached or "–"))
+            rows.append(row(series.title, cells, slope))
         rows.append(row("Temperature, °C", [*map(_degrees, self.temperatures)]))
         rows.append(row("verdict", [report["verdict"] for report in self.reports]))
         return rows
@@ -250,16 +235,12 @@ class History:
             known = [value for value in self.temperatures if value is not None]
             ends = dict.fromkeys(map(_degrees, (min(known), max(known)))) if known else ()
             temperature = f" (temperature {' to '.join(ends)} °C)" if ends else ""
-            text = f"{series.title}: changes by {series.slope_text} per year{temperature}"
-            if date := self._date_text(trend.reached):
-                start = self._date_text(trend.earliest) or "before the first report"
-                end = self._date_text(trend.latest) or "after the last report"
-                text += f"; reached a limit on {date} (95 %: {start} to {end})"
-            yield text
+            yield f"{series.title}: changes by {series.slope_text} per year{temperature}"
         if limits is None:
             return
         distance = (series.values - limits.mean) / limits.deviation
-        dates = [self._date_text(year) for year in series.years[np.abs(distance) > ACTION]]
+        beyond = series.years[np.abs(distance) > ACTION]
+        dates = [self.date(year).date().isoformat() for year in beyond]
         if dates:
             yield f"{series.title}: beyond the action limits ({ACTION:g} σ) on {', '.join(dates)}"
         last = distance[-3:]
@@ -268,11 +249,6 @@ class History:
                 f"{series.title}: two of the last three values lie beyond one warning limit "
                 f"({WARNING:g} σ)"
             )
-
-    def _date_text(self, years: float) -> str:
-        """Return the date of a time, years, as text; empty if outside the dates of the reports."""
-        known = 0.0 <= years <= self.years[-1]
-        return self.date(years).date().isoformat() if known else ""
 
 
 def _ball(report: dict[str, Any]) -> str:
@@ -306,17 +282,13 @@ def _control_limits(values: NDArray[np.float64]) -> ControlLimits | None:
     return ControlLimits(float(values.mean()), deviation) if deviation else None
 
 
-def read_history(
-    paths: Iterable[str | os.PathLike[str]], *, different_balls: bool = False
-) -> History:
+def read_history(paths: Iterable[str | os.PathLike[str]]) -> History:
     """Read the reports of one ball.
 
     Parameters
     ----------
     paths
         Files ``report.json``, or directories that hold them at any depth.
-    different_balls
-        Whether reports of different balls, serial numbers or sources are allowed.
 
     Raises
     ------
@@ -328,28 +300,19 @@ def read_history(
         refuse("there are no reports", "one report.json or more")
     dated = sorted(((*_read(file), file) for file in files), key=lambda entry: entry[0])
     dates, reports, origins = zip(*dated, strict=True)
-    for report, file in zip(reports[1:], origins[1:], strict=True):
-        _require_same(report, file, reports[0], origins[0], allow_balls=different_balls)
-    names = {_ball(report) for report in reports}
-    title = names.pop() if len(names) == 1 else f"{len(names)} balls"
-    return History(title or "ball", dates, reports)
+    identity, first = _identity(reports[0]), origins[0]
+    for report, file in zip(reports, origins, strict=True):
+        for key, value in _identity(report).items():
+            if value != identity[key]:
+                problem = f"{file}: {key} {value!r} is not that of {first}, {identity[key]!r}"
+                refuse(problem, "reports of one ball")
+    return History(_ball(reports[0]) or "ball", dates, reports)
 
 
-def _require_same(
-    report: dict[str, Any], file: Path, first: dict[str, Any], origin: Path, *, allow_balls: bool
-) -> None:
-    names, first_names = ([c["name"] for c in r["criteria"]] for r in (report, first))
-    if report["source"] != first["source"] or names != first_names:
-        refuse(
-            f"{file}: its source {report['source']!r} or its criteria are not those of {origin}",
-            "reports of one source",
-        )
-    for key, title in (("serial", "serial number"), ("ball", "ball")):
-        if report[key] != first[key] and not allow_balls:
-            refuse(
-                f"{file}: its {title} {report[key]!r} is not that of {origin}, {first[key]!r}",
-                "reports of one ball, or --different-balls",
-            )
+def _identity(report: dict[str, Any]) -> dict[str, str]:
+    """Return what all reports of a ball have in common."""
+    names = ", ".join(criterion["name"] for criterion in report["criteria"])
+    return {**{key: report[key] for key in ("ball", "serial", "source")}, "criteria": names}
 
 
 def _files(path: Path) -> list[Path]:
@@ -434,30 +397,4 @@ def _trend(series: Series, significance: float) -> Trend:
     rounding = 1e-9 * max(float(np.abs(value).max()), 1e-300)
     significant = abs(slope) > bound and abs(slope) * float(np.ptp(time)) > rounding
     ends = np.array([time[0], time[-1]])
-    line = mean + slope * (ends - middle)
-    times = (math.nan, math.nan, math.nan)
-    if significant:
-        limit = series.entries[-1]["upper" if slope > 0 else "lower"]
-        crossing = _crossing(limit - mean, slope, factor(0.05), weight.sum(), spread)
-        # A line says nothing beyond its values.
-        if time[0] <= middle + crossing[0] <= time[-1]:
-            times = crossing
-    return Trend(slope, expanded, significant, ends, line, *(middle + instant for instant in times))
-
-
-def _crossing(
-    distance: float, slope: float, factor: float, weights: float, spread: float
-) -> tuple[float, float, float]:
-    """Return the time at which a line reaches a limit, and its interval, since the mean time.
-
-    The ends of the interval (Fieller) are the times at which the confidence band of the line
-    reaches the limit: (distance - slope t)**2 = factor**2 (1/weights + t**2/spread).
-    """
-    a = slope**2 - factor**2 / spread
-    b = slope * distance
-    c = distance**2 - factor**2 / weights
-    root = b**2 - a * c
-    if a <= 0 or root < 0:
-        return distance / slope, math.nan, math.nan
-    low, high = (b - math.sqrt(root)) / a, (b + math.sqrt(root)) / a
-    return distance / slope, low, high
+    return Trend(slope, expanded, significant, ends, mean + slope * (ends - middle))

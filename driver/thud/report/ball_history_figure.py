@@ -53,7 +53,7 @@ def draw_history(history: History) -> Figure:
 
     The allowed range is grey, bars are expanded uncertainties (95 %), markers show the verdict, and
     lines the significant trends, control limits and calibrations. The last panel has the recorded
-    temperatures. If the reports are of different balls, each point has the number of its ball.
+    temperatures.
     """
     has_temperature = any(value is not None for value in history.temperatures)
     count = len(history.series) + has_temperature
@@ -92,8 +92,7 @@ def _draw_criterion(axes: Axes, history: History, series: Series) -> None:
     edges = np.array([history.dates[0] - span, *history.dates, history.dates[-1] + span])
     lower, upper = np.pad(bounds, ((1, 1), (0, 0)), "edge").T
     axes.fill_between(edges, lower, upper, step="mid", color=GRAY, linewidth=0)
-    numbers = _ball_numbers(history)
-    for i, (date, entry) in enumerate(zip(history.dates, entries, strict=True)):
+    for date, entry in zip(history.dates, entries, strict=True):
         if entry["value"] is None:
             continue
         bar = (entry["expanded_uncertainty"] or 0.0) * scale
@@ -101,14 +100,9 @@ def _draw_criterion(axes: Axes, history: History, series: Series) -> None:
             date, entry["value"] * scale, yerr=bar,  # type: ignore[arg-type]
             **_marker(entry["verdict"]),
         )  # fmt: skip
-        if numbers:
-            axes.annotate(
-                str(numbers[history.balls[i]]), (date, entry["value"] * scale),
-                (3, 4), textcoords="offset points", fontsize="x-small",
-            )  # fmt: skip
     if all(entry["value"] is None for entry in entries):
         axes.text(0.5, 0.5, NOT_KNOWN, transform=axes.transAxes, ha="center")
-    if series.trend is not None and series.trend.significant:
+    if series.trend and series.is_drifting:
         dates = np.array([history.date(year) for year in series.trend.time])
         axes.plot(dates, series.trend.value * scale, **TREND)
     if series.control is not None:
@@ -150,11 +144,4 @@ def _add_legend(axes: Axes, history: History) -> None:
             axes.plot([], [], label=f"{name} limits ({factor:g} σ)", **line)
     if history.calibrations:
         axes.plot([], [], label="calibration", **CALIBRATION)
-    balls = [f"{number}: {name}" for name, number in _ball_numbers(history).items()]
-    title = fill("; ".join(balls), MAX_TITLE) or history.title
-    legend_above(axes, title=escape_label(title))
-
-
-def _ball_numbers(history: History) -> dict[str, int]:
-    """Return the numbers of different balls by their names; empty for one ball."""
-    return {name: number for number, name in enumerate(dict.fromkeys(history.balls), 1)}
+    legend_above(axes, title=escape_label(fill(history.title, MAX_TITLE)))
