@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from decimal import Decimal
 from itertools import groupby
 from typing import TYPE_CHECKING
 
@@ -72,7 +73,7 @@ class _Range:
         ordered = sorted(set(self.values), key=lambda value: (isinstance(value, str), value))
         if form == "list":
             return _listed([int(value) for value in ordered])
-        texts = list(dict.fromkeys(format(value, form) for value in ordered))
+        texts = list(dict.fromkeys(_text(value, form) for value in ordered))
         return texts[0] if len(texts) == 1 else f"{texts[0]} to {texts[-1]}"
 
 
@@ -91,6 +92,16 @@ def sentence(notes: Sequence[Note]) -> str:
     # Facts of the library bring their text; their codes may be those of the driver too.
     text = LIBRARY if "text" in values else _SENTENCES[notes[0].code]
     return (part + text).format(**values)
+
+
+def _text(value: float | str, form: str) -> str:
+    """Return a value by a format, never with an exponent.
+
+    >>> _text(2e4, ".4g"), _text(2.5e-5, ".2g")
+    ('20000', '0.000025')
+    """
+    text = format(value, form)
+    return text if isinstance(value, str) or "e" not in text else f"{Decimal(text):f}"
 
 
 def _listed(numbers: Sequence[int]) -> str:

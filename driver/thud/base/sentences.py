@@ -108,8 +108,8 @@ WARNINGS = {
     "an expanded uncertainty of {high:.2g}; the effective mass is {mass:.3f} kg: check mass, "
     "height and calibration",
     "effective_mass": "the mass is not stated: the effective mass is assessed",
-    "outlier": "{quantity} {value:.6g} lies {score:.4g} standard deviations from the mean of the "
-    "drops (Grubbs, 5 %: {critical:.4g})",
+    "outlier": "{quantity} {value:.4g} lies {score:.3g} standard deviations from the mean of the "
+    "drops (Grubbs, 5 %: {critical:.3g})",
     "uncertainty_not_stated": "uncertainty not stated, and not included: {names}",
     # Instruments.
     "plate_assumed": "not stated, and assumed for levels and peak: the force plate is flat within "
