@@ -18,7 +18,7 @@ from thud import cli
 from thud.base.files import Results
 from thud.recordings.signal import Signal
 from thud.report import recording_files
-from thud.report.contents import criteria_data
+from thud.report.contents import report_data
 from thud.report.recording_files import PDF
 from thud.report.rows import HEAD
 
@@ -57,13 +57,20 @@ def names(folder: Path) -> set[str]:
 
 
 def test_screen_files_and_page_say_the_same(noisy: thud.Recording, tmp_path: Path) -> None:
-    recording_files.save(noisy, Results(tmp_path, "measure"))
-    head, *screen = recording_files.table(criteria_data(noisy))
+    recording_files.save(noisy, report_data(noisy), Results(tmp_path, "measure"))
+    head, *screen = recording_files.table(report_data(noisy)["criteria"])
     table = rows_of(tmp_path / "criteria.csv")
     data = json.loads((tmp_path / "report.json").read_text())
-    rows = re.findall(r'<tr class="[a-z-]+">(.*?)</tr>', (tmp_path / "report.html").read_text())
+    rows = re.findall(
+        r'<tr class="[a-z-]+">(.*?)</tr>', (tmp_path / "report.html").read_text(), re.DOTALL
+    )
     page = [
-        [html.unescape(re.sub(r"<svg.*?</svg>|<[^>]*>", "", cell)) for cell in row.split("</td>")]
+        [
+            html.unescape(re.sub(r"<svg.*?</svg>|<[^>]*>", "", cell, flags=re.DOTALL)).replace(
+                "\N{NO-BREAK SPACE}", " "
+            )
+            for cell in row.split("</td>")
+        ]
         for row in rows
     ]
     columns = [HEAD.index(title) for title in head[:-1]]
@@ -95,7 +102,7 @@ def test_screen_files_and_page_say_the_same(noisy: thud.Recording, tmp_path: Pat
 
 
 def test_levels_and_criteria_agree_on_uncertainty(noisy: thud.Recording, tmp_path: Path) -> None:
-    recording_files.save(noisy, Results(tmp_path, "measure"), figures=False)
+    recording_files.save(noisy, report_data(noisy), Results(tmp_path, "measure"), figures=False)
     rows = rows_of(tmp_path / "levels.csv")
     data = json.loads((tmp_path / "report.json").read_text())
     criteria = rows_of(tmp_path / "criteria.csv")[:5]
@@ -111,7 +118,7 @@ def test_levels_and_criteria_agree_on_uncertainty(noisy: thud.Recording, tmp_pat
 def test_uncertainty_that_nobody_states_is_empty_and_not_zero(
     noisy: thud.Recording, tmp_path: Path
 ) -> None:
-    recording_files.save(noisy, Results(tmp_path, "measure"), figures=False)
+    recording_files.save(noisy, report_data(noisy), Results(tmp_path, "measure"), figures=False)
     decisions = noisy.assess().criteria
     for row, one in zip(rows_of(tmp_path / "criteria.csv"), decisions, strict=True):
         assert bool(row["uncertainty"]) == bool(one.estimate.contributions), one.name
@@ -158,7 +165,7 @@ def test_page_that_fails_leaves_the_earlier_results(
     results.write({"levels.csv": b"earlier"})
     monkeypatch.setattr(recording_files, "page_contents", fail)
     with pytest.raises(MemoryError):
-        recording_files.save(noisy, results)
+        recording_files.save(noisy, report_data(noisy), results)
     assert names(results.folder) == {"levels.csv"}
 
 

@@ -8,9 +8,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from jinja2 import Environment, PackageLoader
 
-from thud.base.display import html_text
 from thud.floors.prediction import rating_title
 from thud.level.assessment import octave_limits
 from thud.level.levels import get_bands
@@ -33,6 +31,7 @@ from thud.plot.style import (
     new_figure,
     own_style,
 )
+from thud.plot.templates import render
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -51,7 +50,6 @@ if TYPE_CHECKING:
 _SHARED = resources.files("thud") / "explorer/page"
 _SCRIPTS, _STYLE = ("page.js", "plot.js"), "plot.css"
 _MODULE = re.compile(r"^(?:import .*\n|export )", re.MULTILINE)
-_PAGES = Environment(loader=PackageLoader("thud.plot", ""), autoescape=True)
 
 
 def html_page(
@@ -69,13 +67,13 @@ def html_page(
         "".join((_SHARED / name).read_text(encoding="utf-8") for name in names)
         for names in (_SCRIPTS, (_STYLE,))
     )
-    return _PAGES.get_template("page.html").render(
+    return render(
+        "plot/page.html",
         title=title,
         text=text,
         table=table,
         warnings=warnings,
         plots=plots,
-        symbols=html_text,
         style=style,
         script=_MODULE.sub("", script),
     )

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from thud.recordings.recording import Origin, Recording
 
 FORMAT = "thud calibration report 1"
+# Code of the note on drops that the laboratory left out.
+LEFT_OUT = "drop_left_out"
 # What ISO/IEC 17025:2017, 7.8.2 to 7.8.4, asks of a report, by the key that states it.
 FIELDS = {
     "number": "number of the report",
@@ -96,10 +98,12 @@ def report_data(recording: Recording) -> dict[str, Any]:
             {"requirement": check.requirement, "met": check.met, "reason": str(check.note)}
             for check in check_plate(config.plate)
         ],
-        "processing": sentences(recording, is_warning=False),
-        "warnings": sentences(recording, is_warning=True),
+        "left_out": sentences(recording, lambda note: note.code == LEFT_OUT),
+        "processing": sentences(
+            recording, lambda note: not note.is_warning and note.code != LEFT_OUT
+        ),
+        "warnings": sentences(recording, lambda note: note.is_warning),
         "notes": [_note(note) for note in recording.own_notes],
-        "without_outliers": _without_outliers(recording),
         "files": [
             {
                 "name": origin.name,
@@ -205,26 +209,6 @@ def missing_fields(config: Config, origins: Iterable[Origin]) -> list[str]:
     elif not all(certified):
         missing.append("certificates of instruments")
     return missing
-
-
-def _without_outliers(recording: Recording) -> dict[str, Any] | None:
-    """Return the means over the drops that are no outliers; None if no drop is an outlier."""
-    names = {outlier.subject for outlier in recording.outliers}
-    kept = [i for i, drop in enumerate(recording.drops) if drop.name not in names]
-    if not names or not kept:
-        return None
-    drops = [recording.drops[i] for i in kept]
-    energies = 10 ** (recording.average().drops.level[kept] / 10)
-    means = {
-        name: [getattr(drop, name).value for drop in drops]
-        for name in ("contact_time", "restitution", "peak_force")
-    }
-    known = {name: [v for v in values if math.isfinite(v)] for name, values in means.items()}
-    return {
-        "drops": len(kept),
-        "levels": (10 * np.log10(energies.mean(axis=0))).tolist(),
-        **{name: float(np.mean(values)) if values else None for name, values in known.items()},
-    }
 
 
 def _levels(recording: Recording, bands: BandSet) -> dict[str, Any]:

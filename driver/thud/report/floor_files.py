@@ -89,7 +89,7 @@ def page_contents(floor: PredictedFloor, folder: Path) -> dict[str, bytes]:
             "levels": partial(draw_levels, floor.prediction),
         })
     )  # fmt: skip
-    section, levels = (figures.get(f"{name}.svg", b"").decode() for name in ("section", "levels"))
+    section, levels = (figures.get(f"{name}.svg", b"") for name in ("section", "levels"))
     page = floor_page(floor, section, levels)
     printed = pdf_file(page, f"{floor.file}.pdf", folder, page_texts(floor))
     return {f"{floor.file}.html": page.encode(), **printed}

@@ -11,7 +11,7 @@ from thud.case.keys import humanize
 from thud.floors.prediction import rating_title, source_note
 from thud.floors.resonances import floor_frequencies, resonances, room_frequencies
 from thud.level.rating import class_text
-from thud.report.markup import inline_svg, render
+from thud.plot.templates import render
 from thud.report.predicted_floor import (
     CAVEAT,
     band_rows,
@@ -27,22 +27,22 @@ if TYPE_CHECKING:
     from thud.report.predicted_floor import PredictedFloor
 
 
-def floor_page(floor: PredictedFloor, section: str, figure: str) -> str:
+def floor_page(floor: PredictedFloor, section: bytes, figure: bytes) -> str:
     """Return the page as self-contained HTML, with the section and the levels as SVG."""
     prediction = floor.prediction
     title = f"Predicted impact sound: {floor.name}"
     octave_levels = (number_text(level, ".1f") for level in prediction.octave_level)
     errors = getattr(prediction.source, "level_error", np.array(np.nan))
     return render(
-        "floor.html",
+        "report/floor.html",
         title=title,
         identity=title,
         version=version(),
         floor=floor,
         prediction=prediction,
         box=_box(floor),
-        section=section and inline_svg(section, "s"),
-        figure=figure and inline_svg(figure, "l"),
+        section=section,
+        figure=figure,
         about=_about(floor),
         ratings=[("Rating", "Value"), *((name, text) for name, _, _, text in floor.ratings)],
         contributions=[
@@ -105,7 +105,7 @@ def _mode_rows(prediction: RoomPrediction) -> list[tuple[str, ...]]:
     return [("", *map(str, numbers)), *padded]
 
 
-def _about(floor: PredictedFloor) -> list[tuple[str, str]]:
+def _about(floor: PredictedFloor) -> dict[str, str]:
     """Return room and source."""
     prediction = floor.prediction
     sides = " × ".join(f"{side:.3g}" for side in prediction.size)  # noqa: RUF001
@@ -140,7 +140,7 @@ def _about(floor: PredictedFloor) -> list[tuple[str, str]]:
     ]
     if floor.construction and floor.construction.note:
         pairs.append(("Note", floor.construction.note))
-    return pairs
+    return dict(pairs)
 
 
 def _ceiling(prediction: RoomPrediction) -> str:

@@ -7,23 +7,25 @@ from typing import TYPE_CHECKING
 from thud.base.note import sentence
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from thud.base.note import Note
     from thud.recordings.measured_drop import Drop
     from thud.recordings.recording import Origin, Recording
 
+    Select = Callable[[Note], bool]
 
-def sentences(recording: Recording, *, is_warning: bool) -> list[str]:
-    """Return possible faults of a recording, or what was done, a sentence for each kind of note."""
+
+def sentences(recording: Recording, select: Select) -> list[str]:
+    """Return the selected notes of a recording, a sentence for each kind of note."""
     return [
-        *(note.message for note in recording.own_notes if note.is_warning == is_warning),
-        *group_notes(recording.origins, "files", is_warning=is_warning),
-        *group_notes(recording.drops, "drops", is_warning=is_warning),
+        *(note.message for note in recording.own_notes if select(note)),
+        *group_notes(recording.origins, "files", select),
+        *group_notes(recording.drops, "drops", select),
     ]
 
 
-def group_notes(parts: Sequence[Origin | Drop], kind: str, *, is_warning: bool) -> list[str]:
+def group_notes(parts: Sequence[Origin | Drop], kind: str, select: Select) -> list[str]:
     """Return a sentence for the notes that differ in numbers only, with the range of each number.
 
     `parts` are all drops or files, and `kind` is ``"drops"`` or ``"files"``. The sentence states
@@ -31,10 +33,9 @@ def group_notes(parts: Sequence[Origin | Drop], kind: str, *, is_warning: bool) 
     """
     groups: dict[tuple[str, ...], list[tuple[str, Note]]] = {}
     for part in parts:
-        for note in part.notes:
-            if note.is_warning == is_warning:
-                words = [value for value in note.others.values() if isinstance(value, str)]
-                groups.setdefault((note.code, note.unit, *words), []).append((part.name, note))
+        for note in filter(select, part.notes):
+            words = [value for value in note.others.values() if isinstance(value, str)]
+            groups.setdefault((note.code, note.unit, *words), []).append((part.name, note))
     result = []
     for members in groups.values():
         names = list(dict.fromkeys(name for name, _ in members))
@@ -42,10 +43,3 @@ def group_notes(parts: Sequence[Origin | Drop], kind: str, *, is_warning: bool) 
         text = sentence([note for _, note in members])
         result.append(f"{text} ({share})" if len(parts) > 1 else text)
     return result
-
-
-def shorten(items: Sequence[str], count: int) -> list[str]:
-    """Return items up to a number; if there are more, the last one says how many follow."""
-    if len(items) <= count:
-        return list(items)
-    return [*items[: count - 1], f"and {len(items) - count + 1} more, in report.json"]

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
-import base64
 import hashlib
-import math
-from itertools import zip_longest
-from typing import TYPE_CHECKING, Any
-
-from markupsafe import Markup
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from thud.base._schema import QUANTITIES, VERDICTS
+from thud.plot.templates import plain, render
 from thud.recordings.measured_drop import ESTIMATES
 from thud.recordings.recorded_levels import BACKGROUND
 from thud.report.contents import json_bytes
-from thud.report.markup import inline_svg, plain, render
-from thud.report.notes import shorten
 from thud.report.rows import (
     COUNT,
     HEAD,
@@ -23,6 +17,7 @@ from thud.report.rows import (
     NOT_KNOWN,
     capital,
     criterion_row,
+    drop_table,
     excluded_text,
     expanded_text,
     freedom_text,
@@ -35,8 +30,6 @@ from thud.report.rows import (
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-# Maximum length of the list of files.
-MAX_FILES = 60
 # Maximum number of characters of the name at the foot of each page.
 MAX_IDENTITY = 70
 # Minimum number of drops for the test for outliers.
@@ -60,8 +53,22 @@ BUDGET_HEAD = (
     "Degrees of freedom",
     "Share",
 )
-# Horizontal positions of the limits in the picture of a criterion, whose width is 100.
-LOWER_LIMIT_X, UPPER_LIMIT_X = 25.0, 75.0
+# Minimum share of the variance of a contribution that the page lists.
+MIN_SHARE = 0.0005
+# Horizontal positions of the limits in the picture of a criterion, and of its ends.
+LIMITS_X, ENDS_X = (25.0, 75.0), (2.0, 98.0)
+
+
+class RangePicture(NamedTuple):
+    """Horizontal positions of a value and of both ends of value ± U in the picture of a criterion.
+
+    `side` is -1 or 1 if the value lies beyond the left or right end of the picture, else 0.
+    """
+
+    value: float
+    low: float
+    high: float
+    side: int
 
 
 def report_page(
@@ -81,24 +88,24 @@ def report_page(
     identity = f"Report {report['number'] or f'of {name}'}"
     if len(identity) > MAX_IDENTITY or not report["number"]:
         identity = f"{identity[:MAX_IDENTITY]}, SHA-256 {checksum[:16]}…"
-    head = _with_picture(HEAD, "")
     return render(
-        "calibration.html",
+        "report/calibration.html",
         title=f"Calibration report: {report['number'] or name}",
         identity=identity,
         data=data,
         checksum=checksum,
-        mark=mark and f"data:{mark[0]};base64,{base64.b64encode(mark[1]).decode()}",
-        source=data["source"].replace("_", " "),
+        mark=mark,
         reason=_reason(criteria),
         about=_about(data),
         measured=_measured(data),
-        head=head,
-        rows=[(c, _with_picture(criterion_row(c), _range_picture(c))) for c in criteria],
+        head=HEAD,
+        rows=[(c, criterion_row(c), range_picture(c)) for c in criteria],
+        limits_x=LIMITS_X,
         excluded=excluded_text(criteria),
         standards=STANDARDS.get(data["source"], "the standards"),
         has_own_limits=any(not criterion["limits_of_standard"] for criterion in criteria),
-        figures=[inline_svg(svg.decode(), f"f{i}") for i, svg in enumerate(figures)],
+        figures=[*figures],
+        drops=drop_table(data),
         budget_head=BUDGET_HEAD,
         budgets=[_budget(criterion) for criterion in criteria if _has_budget(criterion)],
         without_budget=", ".join(
@@ -106,9 +113,8 @@ def report_page(
             for criterion in criteria
             if criterion["name"] != COUNT and not criterion["uncertainty"]
         ),
-        drops=_drops_and_methods(data),
+        methods=_methods(data),
         properties=_properties(data["properties"]),
-        files=_files(data["files"]),
         issued=", ".join(filter(None, [report["place"], report["issued"]])),
     )
 
@@ -137,57 +143,66 @@ def _reason(criteria: Sequence[dict[str, Any]]) -> str:
     return "; ".join(parts)
 
 
-def _about(data: dict[str, Any]) -> list[tuple[str, str]]:
+def _about(data: dict[str, Any]) -> dict[str, str]:
     """Return what is known of laboratory, client and item; [report] only where it is stated."""
     report = data["report"]
-    return [
-        ("Laboratory", data["laboratory"]),
-        *_stated("Address", "\n".join(report["address"])),
-        *_stated("Accreditation", report["accreditation"]),
-        *_stated("Client", "\n".join(report["client"])),
-        ("Ball", data["ball"]),
-        ("Serial number", data["serial"]),
-        *_stated("Item", report["item"]),
-        *_stated("State of the item", report["state"]),
-        *_stated("Received on", report["received"]),
-        ("Measured on", data["date"]),
-        *_stated("Issued on", report["issued"]),
-    ]
+    stated = {
+        "Address": "\n".join(report["address"]),
+        "Accreditation": report["accreditation"],
+        "Client": "\n".join(report["client"]),
+    }
+    item = {
+        "Item": report["item"],
+        "State of the item": report["state"],
+        "Received on": report["received"],
+    }
+    return {
+        "Laboratory": data["laboratory"] or NOT_KNOWN,
+        **_stated(stated),
+        "Ball": data["ball"] or NOT_KNOWN,
+        "Serial number": data["serial"] or NOT_KNOWN,
+        **_stated(item),
+        "Measured on": data["date"] or NOT_KNOWN,
+        **_stated({"Issued on": report["issued"]}),
+    }
 
 
-def _stated(name: str, text: str) -> list[tuple[str, str]]:
-    """Return a name with its text, if there is one."""
-    return [(name, text)] if text else []
+def _stated(pairs: dict[str, str]) -> dict[str, str]:
+    """Return the pairs that have a text."""
+    return {name: text for name, text in pairs.items() if text}
 
 
-def _measured(data: dict[str, Any]) -> list[tuple[str, str]]:
+def _measured(data: dict[str, Any]) -> dict[str, str]:
+    """Return where, how and with what the drops were measured."""
     files, drops, report = data["files"], len(data["drops"]), data["report"]
     rates = sorted({file["sample_rate"] for file in files})
     range_text = " to ".join(dict.fromkeys(f"{rate / 1e3:.4g}" for rate in (rates[0], rates[-1])))
-    amount = f"{_count(drops, 'drop')} in {_count(len(files), 'file')}, {range_text} kHz"
-    calibrations = list(dict.fromkeys(file["calibration"] for file in files if file["calibration"]))
+    calibrations = dict.fromkeys(file["calibration"] for file in files if file["calibration"])
     relative = data["calibration_uncertainty"]
-    uncertainty = (
-        f"u = {100 * relative:.2g} %" if relative is not None else "uncertainty not stated"
-    )
-    calibration = "; ".join(shorten(calibrations, MAX_FILES)) or NOT_KNOWN
+    uncertainty = "uncertainty not stated" if relative is None else f"u = {100 * relative:.2g} %"
     pressure = report["pressure"]
-    return [
-        *_stated("Place", report["place"]),
-        *_stated("Procedure", report["procedure"]),
-        *_stated("Deviations", report["deviations"]),
-        ("Temperature", _number_text(data["temperature"], 1, "°C")),
-        *_stated("Humidity", _number_text(report["humidity"], 0, "%")),
-        *_stated("Air pressure", _number_text(pressure and pressure / 100, 0, "hPa")),
-        ("Recordings", amount),
-        ("Calibration", f"{calibration}; {uncertainty}"),
-        ("Instruments", "\n".join(map(_instrument, data["instruments"]))),
-        *_stated("Traceability", report["traceability"]),
-    ]
+    before = {key.capitalize(): report[key] for key in ("place", "procedure", "deviations")}
+    air = {
+        "Humidity": _number_text(report["humidity"], 0, "%"),
+        "Air pressure": _number_text(pressure and pressure / 100, 0, "hPa"),
+    }
+    return {
+        **_stated(before),
+        "Temperature": _number_text(data["temperature"], 1, "°C") or NOT_KNOWN,
+        **_stated(air),
+        "Recordings": f"{_count(drops, 'drop')} in {_count(len(files), 'file')}, {range_text} kHz",
+        "Calibration": f"{'; '.join(calibrations) or NOT_KNOWN}; {uncertainty}",
+        "Instruments": "\n".join(map(_instrument, data["instruments"])) or NOT_KNOWN,
+        **_stated({"Traceability": report["traceability"]}),
+    }
 
 
 def _number_text(value: float | None, decimals: int, unit: str) -> str:
     return "" if value is None else f"{number(value, decimals)} {unit}"
+
+
+def _count(number_of: int, noun: str) -> str:
+    return f"{number_of} {noun}{'s' * (number_of != 1)}"
 
 
 def _instrument(item: dict[str, str]) -> str:
@@ -201,23 +216,15 @@ def _instrument(item: dict[str, str]) -> str:
 
 def _properties(properties: dict[str, Any]) -> list[str]:
     """Return the stated properties of the ball, with the example of the standards."""
-    lines = []
-    for name, example in EXAMPLES.items():
-        if properties[name] is not None:
-            value = f"{1e3 * properties[name]:.4g} mm".replace("-", "−")
-            lines.append(
-                f"{name.replace('_', ' ')} {value} (standards: {1e3 * example:g} mm as an example, "
-                "no tolerance)"
-            )
+    lines = [
+        f"{name.replace('_', ' ')} {1e3 * properties[name]:.4g} mm (standards: {1e3 * example:g} "
+        "mm as an example, no tolerance)"
+        for name, example in EXAMPLES.items()
+        if properties[name] is not None
+    ]
     lines += [f"{name} {properties[name]}" for name in ("hardness", "surface") if properties[name]]
-    if properties["temperature"] is not None:
-        lines.append(f"temperature {number(properties['temperature'], 1)} °C")
-    return lines
-
-
-def _with_picture(row: Sequence[str], picture: str) -> list[str]:
-    """Insert a picture before the verdict, the last cell of a row."""
-    return [*row[:-1], picture, row[-1]]
+    temperature = _number_text(properties["temperature"], 1, "°C")
+    return [*lines, f"temperature {temperature}"] if temperature else lines
 
 
 def _has_budget(criterion: dict[str, Any]) -> bool:
@@ -245,9 +252,9 @@ def _budget(criterion: dict[str, Any]) -> tuple[str, list[tuple[str, ...]]]:
     )
     rows: list[tuple[str, ...]] = []
     for part in criterion["contributions"]:
-        if not part["uncertainty"]:
+        share = ((part["uncertainty"] or 0.0) / combined) ** 2
+        if share < MIN_SHARE:
             continue
-        share = f"{100 * (part['uncertainty'] / combined) ** 2:.1f} %"
         size, sensitivity = with_unit(part["uncertainty"] * part["divisor"] * scale, unit), "1"
         if part["size"] is not None:
             size = with_unit(part["size"], part["unit"])
@@ -256,118 +263,75 @@ def _budget(criterion: dict[str, Any]) -> tuple[str, list[tuple[str, ...]]]:
         rows.append((
             part["name"], part["kind"], size, f"{part['divisor']:.4g}", sensitivity,
             with_unit(part["uncertainty"] * scale, unit), freedom_text(part["freedom"]),
-            share if part["counted"] else "included",
+            f"{100 * share:.1f} %" if part["counted"] else "included",
         ))  # fmt: skip
     return summary, rows
 
 
-def _range_picture(criterion: dict[str, Any]) -> Markup:
-    """Return the limits of a criterion, its value and its expanded uncertainty as SVG."""
+def range_picture(criterion: dict[str, Any]) -> RangePicture | None:
+    """Return the picture of a criterion; None for a count or an unknown value."""
     lower, upper, value = (criterion[name] for name in ("lower", "upper", "value"))
-    span = UPPER_LIMIT_X - LOWER_LIMIT_X
-    box = f'<rect x="{LOWER_LIMIT_X}" y="1" width="{span}" height="8" fill="#ccc"/>'
     if value is None or lower == upper:
-        return Markup()
-    scale = span / (upper - lower)
-    position = LOWER_LIMIT_X + scale * (value - lower)
-    shown = min(max(position, 2.0), 98.0)
+        return None
+    scale = (LIMITS_X[1] - LIMITS_X[0]) / (upper - lower)
+    position = LIMITS_X[0] + scale * (value - lower)
     half_width = scale * (criterion["expanded_uncertainty"] or 0.0)
-    ends = [min(max(end, 1.0), 99.0) for end in (position - half_width, position + half_width)]
-    bar = ""
-    if ends[0] < ends[1]:
-        bar = "".join(f"M{end:.2f} 2.5V7.5" for end in ends) + f"M{ends[0]:.2f} 5H{ends[1]:.2f}"
-    mark = f'<circle cx="{shown:.2f}" cy="5" r="1.8"/>'
-    if shown != position:
-        tip = math.copysign(3.0, position - shown)
-        mark = f'<path d="M{shown + tip / 2:.2f} 5l{-tip} -3v6z"/>'
-    return Markup(  # noqa: S704 - numbers only
-        f'<svg class="range" viewBox="0 0 100 10" aria-hidden="true">{box}'
-        f'<path d="{bar}" fill="none" stroke="#000" stroke-width="0.9"/>{mark}</svg>'
+    left, right = ENDS_X
+    low, high = (
+        min(max(end, left - 1), right + 1) for end in (position - half_width, position + half_width)
     )
+    side = int(position > right) - int(position < left)
+    return RangePicture(min(max(position, left), right), low, high, side)
 
 
-def _means(drops: Sequence[dict[str, Any]]) -> list[str]:
+def _means(drops: Sequence[dict[str, Any]]) -> Iterable[str]:
+    """Yield the means over the drops that are no rows of the table of criteria."""
     means = []
     for name in ESTIMATES:
         known = [drop[name]["value"] for drop in drops if drop[name]["value"] is not None]
-        # Contact time and restitution are rows of the table of criteria.
         if known and name not in {"contact_time", "restitution"}:
             quantity = QUANTITIES[name]
-            unit = f" {quantity.display_unit}" if quantity.display_unit else ""
-            means.append(f"{quantity.title} {quantity.show(sum(known) / len(known))}{unit}")
+            value = quantity.show(sum(known) / len(known))
+            means.append(f"{quantity.title} {value} {quantity.display_unit}".rstrip())
+    yield f"mean: {', '.join(means)}"
     methods: dict[str, list[float]] = {}
     for drop in drops:
         for method, estimate in drop["restitutions"].items():
             methods.setdefault(method, []).append(estimate["value"])
-    restitutions = [
-        f"by {name} {number(sum(values) / len(values), 3)}" for name, values in methods.items()
-    ]
-    return [
-        f"mean: {', '.join(means)}",
-        *([f"mean restitution: {', '.join(restitutions)}"] if restitutions else []),
-    ]
+    if methods:
+        texts = (f"by {name} {number(sum(v) / len(v), 3)}" for name, v in methods.items())
+        yield f"mean restitution: {', '.join(texts)}"
 
 
-def _drops_and_methods(data: dict[str, Any]) -> list[str]:
+def _methods(data: dict[str, Any]) -> Iterable[str]:
+    """Yield the means of the drops, and how levels and plate were treated."""
     drops, low, high = data["drops"], *BACKGROUND
-    results = _means(drops)
+    yield from _means(drops)
     averaged = "energy average of the drops" if len(drops) > 1 else "of one drop"
-    results.append(
+    yield (
         f"levels: {averaged}, method exact (band energy of the force from first touch to release, "
         "with a margin for their uncertainty; zero outside)"
     )
     flags = {entry["flag"] for entry in data["criteria"]}
     if "corrected" in flags:
-        results.append(f"levels {low:g} to {high:g} dB above the background were corrected for it")
+        yield f"levels {low:g} to {high:g} dB above the background were corrected for it"
     if "background" in flags:
-        results.append(f"levels less than {low:g} dB above the background are upper bounds")
-    plate_checks = data["plate"]
-    met = [check["reason"] for check in plate_checks if check["met"]]
-    if met:
-        results.append(f"force plate: {'; '.join(met)}")
+        yield f"levels less than {low:g} dB above the background are upper bounds"
+    if met := [check["reason"] for check in data["plate"] if check["met"]]:
+        yield f"force plate: {'; '.join(met)}"
     bands = [f"{entry['band']:g}" for entry in data["criteria"] if entry["band"] is not None]
     for method, differences in data["method_differences"].items():
         if any(differences):
             values = " / ".join("–" if d is None else number(d, 2) for d in differences)
-            results.append(
+            yield (
                 f"method {method} differs from exact by up to {values} dB in the octaves of "
                 f"{bands[0]} to {bands[-1]} Hz, in this order"
             )
-    return [*results, *_outliers(data)] if len(drops) >= MIN_DROPS else results
-
-
-def _outliers(data: dict[str, Any]) -> list[str]:
-    """Return how many drops are outliers, and the means with and without them."""
-    outliers = [note for note in data["notes"] if note["code"] == "outlier"]
-    names = {note["subject"] for note in outliers}
-    if not names:
-        return ["no drop differs from the others by more than chance (Grubbs, 5 %)"]
-    count = _count(len(names), "outlier")
-    lines = [
-        f"{count} (Grubbs, 5 %), marked but not excluded: all values and averages include them"
-    ]
-    other = data["without_outliers"]
-    if other:
-        levels = " / ".join("–" if z is None else number(z, 2) for z in other["levels"])
-        parts = [f"{levels} dB"]
-        if other["contact_time"] is not None:
-            parts.append(f"contact time {number(1e3 * other['contact_time'], 2)} ms")
-        if other["restitution"] is not None:
-            parts.append(f"restitution {number(other['restitution'], 3)}")
-        lines.append(
-            f"average of the other {_count(other['drops'], 'drop')}, without outliers: "
-            f"{', '.join(parts)}"
+    outliers = {note["subject"] for note in data["notes"] if note["code"] == "outlier"}
+    if outliers:
+        yield (
+            f"{_count(len(outliers), 'outlier')} (Grubbs, 5 %), marked but not excluded: all "
+            "values and averages include them"
         )
-    return lines
-
-
-def _files(files: Sequence[dict[str, Any]]) -> list[tuple[str, str]]:
-    names = shorten([file["name"] for file in files], MAX_FILES)
-    # If there are more files, the last text says how many and has no checksum.
-    listed = files if len(files) <= MAX_FILES else files[: MAX_FILES - 1]
-    checksums = [file["sha256"] for file in listed]
-    return list(zip_longest(names, checksums, fillvalue=""))
-
-
-def _count(number_of: int, noun: str) -> str:
-    return f"{number_of} {noun}{'s' * (number_of != 1)}"
+    elif len(drops) >= MIN_DROPS:
+        yield "no drop differs from the others by more than chance (Grubbs, 5 %)"

@@ -10,8 +10,8 @@ import matplotlib as mpl
 from matplotlib import font_manager, ft2font
 
 from thud.base.errors import ReportWarning
+from thud.plot.templates import FAMILY
 
-FAMILY = "DejaVu Sans"
 FILES = {"normal": "DejaVuSans.ttf", "bold": "DejaVuSans-Bold.ttf"}
 NEEDED = (
     "pip install weasyprint, and Debian's libpango-1.0-0, libpangoft2-1.0-0 and "

@@ -240,7 +240,7 @@ class PredictedFloor:
 
 # Title with unit, decimals or significant digits on the page, and value of each column of bands.
 COLUMNS: dict[str, tuple[str, Callable[[PredictedFloor], Iterable[float]]]] = {
-    "force level, dB re 1 N": (".1f", lambda floor: floor.force_levels),
+    "force level, dB re 1 N, 1 s": (".1f", lambda floor: floor.force_levels),
     "energy into the bearing floor, µJ": ("#.3g", lambda floor: 1e6 * floor.prediction.energy),
     "radiation factor": ("#.3g", lambda floor: floor.prediction.radiation_factor),
     "loss factor": (".3f", lambda floor: floor.prediction.loss_factor),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import warnings
 from functools import partial
 from pathlib import Path
@@ -16,11 +15,9 @@ from thud.base.display import draw_all, warn_if_not_drawn
 from thud.base.errors import ReportWarning
 from thud.base.files import Results, read_input
 from thud.base.tables import csv_text, marked
-from thud.level.estimate import UNKNOWN, Estimate
-from thud.level.levels import get_bands
 from thud.recordings.recording import Recording
 from thud.report.contents import FORMAT, json_bytes, report_data
-from thud.report.rows import HEAD, NOT_KNOWN, criterion_row
+from thud.report.rows import HEAD, criterion_row
 
 if TYPE_CHECKING:
     import os
@@ -41,54 +38,22 @@ PICTURES = {".svg": "image/svg+xml", ".png": "image/png", ".jpg": "image/jpeg"}
 MAX_PICTURE = 300_000
 
 
-def drop_table(recording: Recording) -> list[tuple[str, ...]]:
-    """Return a row of text for each drop: first touch, contact, restitutions, peak and levels.
-
-    The number after ± is the standard uncertainty due to the noise of the drop.
-    """
-    nominal = get_bands().nominal
-    levels = recording.average().drops.level
-    methods = dict.fromkeys(method for drop in recording.drops for method in drop.restitutions)
-    restitutions = [f"restitution by {method} (± u)" for method in methods] or ["restitution"]
-    head = ("drop", "at, s", "contact, ms (± u)", *restitutions, "peak, N")
-    rows: list[tuple[str, ...]] = [(*head, *(f"{f:g} Hz, dB" for f in nominal))]
-    rows += [
-        (
-            drop.name,
-            f"{drop.onset:.3f}",
-            _with_u(drop.contact_time, 1e-3, 2),
-            *(_with_u(drop.restitutions.get(m, UNKNOWN), 1.0, 3) for m in methods or [""]),
-            f"{drop.peak_force.value:.0f}",
-            *(f"{level:z.2f}" for level in levels[i]),
-        )
-        for i, drop in enumerate(recording.drops)
-    ]
-    return rows
-
-
 def table(criteria: Sequence[dict[str, Any]]) -> list[tuple[str, ...]]:
     """Return the criteria of a report as rows of text, without the columns of the page alone."""
     shown = [i for i, title in enumerate(HEAD) if title in _SHOWN]
     return [tuple(row[i] for i in shown) for row in (HEAD, *map(criterion_row, criteria))]
 
 
-def _with_u(estimate: Estimate, unit: float, decimals: int) -> str:
-    if math.isnan(estimate.value):
-        return NOT_KNOWN
-    return f"{estimate.value / unit:.{decimals}f} ± {estimate.uncertainty / unit:.{decimals + 1}f}"
-
-
-def verdict_text(recording: Recording, criteria: Sequence[dict[str, Any]]) -> str:
-    """Return the verdict, marked, as a sentence with a note on limits of the laboratory."""
-    assessment = recording.assess()
-    is_undecided = assessment.conforms == VERDICTS[2]
+def verdict_text(data: dict[str, Any]) -> str:
+    """Return the verdict of a report, marked, as a sentence with a note on own limits."""
+    verdict, criteria = data["verdict"], data["criteria"]
+    is_undecided = verdict == VERDICTS[2]
     subject, relation = ("The result is", "by") if is_undecided else ("The source", "to")
-    verdict = marked(assessment.conforms, assessment.conforms)
-    limits = f"the limits of the {assessment.source.replace('_', ' ')}"
+    limits = f"the limits of the {data['source'].replace('_', ' ')}"
     has_own_limits = any(not criterion["limits_of_standard"] for criterion in criteria)
     note = " Limits marked * are those of the laboratory." if has_own_limits else ""
-    counts = count_verdicts(criterion.conforms for criterion in assessment.criteria)
-    return f"{subject} {verdict} {relation} {limits} at 95 %: {counts}.{note}"
+    counts = count_verdicts(criterion["verdict"] for criterion in criteria)
+    return f"{subject} {marked(verdict, verdict)} {relation} {limits} at 95 %: {counts}.{note}"
 
 
 def count_verdicts(results: Iterable[str]) -> str:
@@ -176,17 +141,24 @@ def write_report(
         another recording is replaced.
     """
     require_kind("recording", recording, Recording)
-    return save(recording, Results(Path(directory), "measure", replace=replace))
+    results = Results(Path(directory), "measure", replace=replace)
+    return save(recording, report_data(recording), results)
 
 
 def save(
-    recording: Recording, results: Results, *, figures: bool = True, stages: Stages | None = None
+    recording: Recording,
+    data: dict[str, Any],
+    results: Results,
+    *,
+    figures: bool = True,
+    stages: Stages | None = None,
 ) -> list[Path]:
     """Write levels, criteria and data; with `figures` also the figures and the page.
 
-    With the stages of a drop, they are drawn too. For errors and warnings see `write_report`.
+    `data` is the result of `report_data`. With the stages of a drop, they are drawn too. For
+    errors and warnings see `write_report`.
     """
-    data, folder = report_data(recording), results.folder
+    folder = results.folder
     contents = {
         LEVELS: levels_csv(data).encode(),
         CRITERIA: criteria_csv(data).encode(),

@@ -66,6 +66,37 @@ def criterion_row(criterion: dict[str, Any]) -> tuple[str, ...]:
     )
 
 
+def drop_table(data: dict[str, Any]) -> list[tuple[str, ...]]:
+    """Return a row of text for each drop: first touch, contact, restitutions, peak and levels.
+
+    The number after ± is the standard uncertainty due to the noise of the drop.
+    """
+    drops, levels = data["drops"], data["levels"]["octave"]
+    methods = [*dict.fromkeys(method for drop in drops for method in drop["restitutions"])]
+    restitutions = [f"restitution by {method} (± u)" for method in methods] or ["restitution"]
+    head = ("drop", "at, s", "contact, ms (± u)", *restitutions, "peak, N")
+    rows: list[tuple[str, ...]] = [(*head, *(f"{f:g} Hz, dB" for f in levels["band"]))]
+    rows += [
+        (
+            drop["name"],
+            number(drop["onset"], 3),
+            _with_u(drop["contact_time"], 1e3, 2),
+            *(_with_u(drop["restitutions"].get(method), 1.0, 3) for method in methods or [""]),
+            _text(drop["peak_force"]["value"], 1.0, 0),
+            *(_text(level, 1.0, 2) for level in own),
+        )
+        for drop, own in zip(drops, levels["drops"], strict=True)
+    ]
+    return rows
+
+
+def _with_u(estimate: dict[str, float] | None, scale: float, decimals: int) -> str:
+    if not estimate or estimate["value"] is None:
+        return NOT_KNOWN
+    width = number(scale * estimate["uncertainty"], decimals + 1)
+    return f"{number(scale * estimate['value'], decimals)} ± {width}"
+
+
 def value_text(criterion: dict[str, Any]) -> str:
     """Return the value of a criterion with the decimals of its expanded uncertainty, as text."""
     value, scale = criterion["value"], quantity_of(criterion).display_scale
