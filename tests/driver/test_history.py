@@ -236,20 +236,6 @@ def test_temperatures_and_calibrations_are_shown() -> None:
     np.testing.assert_allclose(sorted(drawn), expected)
 
 
-def test_marks_of_the_table_are_explained(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    found = read_history([folder])
-    line = "?: undecided; *: the drift is significant, at 5 % for all criteria together"
-    assert found.marks() == line
-    options = argparse.Namespace(
-        name="history", reports=[str(folder)], output=str(folder / "out"),
-        quiet=False, replace=False,
-    )  # fmt: skip
-    run_history(options)
-    assert line in capsys.readouterr().out.splitlines()
-    # Drop height is unknown in all of them, so that one verdict is always undecided.
-    assert "*" not in history(count=2).marks()
-
-
 def test_ball_that_does_not_change_has_no_trend() -> None:
     told = sum(any(series.is_drifting for series in history(seed=k).series) for k in range(300))
     # Five levels differ, the test is for all of them together: at most 5 % (99.9 % of the draws).
@@ -316,8 +302,8 @@ def test_reports_are_in_the_order_of_their_dates(folder: Path) -> None:
     assert head[1:6] == tuple(f"{2018 + k}-06-01" for k in range(5))
     assert [row[0] for row in rows][-1] == "verdict"
     assert rows[1][5].startswith("32.4")
-    assert rows[1][5].endswith(" ?")
-    assert rows[1][-1].endswith(" *")
+    assert rows[1][5].endswith(" undecided")
+    assert rows[1][-1].endswith(" significant")
 
 
 def test_table_of_many_reports_is_not_wide() -> None:

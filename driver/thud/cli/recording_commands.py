@@ -192,8 +192,8 @@ def run_history(options: argparse.Namespace) -> int:
     history = read_history(options.reports)
     results = results_of(options, "history", options.reports)
     contents = figures_of(options, {"history": partial(draw_history, history)})
-    parts = [history.title, format_rows(history.table()), history.marks(), *history.warnings()]
-    return finish(options, results, contents, "\n".join(filter(None, parts)))
+    parts = [history.title, format_rows(history.table()), *history.warnings()]
+    return finish(options, results, contents, "\n".join(parts))
 
 
 HISTORY = Command(

@@ -18,6 +18,7 @@ from thud.base._schema import VERDICTS
 from thud.base.checks import refuse
 from thud.base.files import read_input
 from thud.base.immutable import Immutable
+from thud.base.tables import Result
 from thud.recordings.words import read_date
 from thud.report.contents import FORMAT
 from thud.report.rows import capital, number, quantity_of, value_text
@@ -42,9 +43,6 @@ MIN_VALUES, MOVING_RANGE = 5, 2 / math.sqrt(math.pi)
 WARNING, ACTION = 2.0, 3.0
 # Maximum number of reports in the table: the first and the most recent ones.
 MAX_COLUMNS = 8
-# Marks in the table: of values by verdict, and of significant drifts.
-MARKS = {VERDICTS[0]: "", VERDICTS[1]: " no", VERDICTS[2]: " ?"}
-SIGNIFICANT = " *"
 # Maximum size of a report, bytes.
 MAX_SIZE = 2**28
 # Texts of a report, and numbers of each of its criteria, that a history needs.
@@ -207,23 +205,12 @@ class History:
         days = [date.date().isoformat() for date in self.dates]
         rows = [row("", days, "per year")]
         for series in self.series:
-            cells = [value_text(entry) + MARKS[entry["verdict"]] for entry in series.entries]
-            slope = series.slope_text + SIGNIFICANT * series.is_drifting
-            rows.append(row(series.title, cells, slope))
+            slope = series.slope_text + " significant" * series.is_drifting
+            rows.append(row(series.title, [*map(_cell, series.entries)], slope))
         rows.append(row("Temperature, °C", [*map(_degrees, self.temperatures)]))
-        rows.append(row("verdict", [report["verdict"] for report in self.reports]))
+        verdicts = [Result(report["verdict"], report["verdict"]) for report in self.reports]
+        rows.append(row("verdict", verdicts))
         return rows
-
-    def marks(self) -> str:
-        """Return the meaning of the marks that the table has, as a line; empty if it has none."""
-        verdicts = {entry["verdict"] for series in self.series for entry in series.entries}
-        parts = [f"{mark.strip()}: {v}" for v, mark in MARKS.items() if mark and v in verdicts]
-        if any(series.is_drifting for series in self.series):
-            parts.append(
-                f"{SIGNIFICANT.strip()}: the drift is significant, at {100 * SIGNIFICANCE:g} % "
-                "for all criteria together"
-            )
-        return "; ".join(parts)
 
     def warnings(self) -> list[str]:
         """Return a warning for each significant trend, and for values beyond control limits."""
@@ -258,6 +245,15 @@ def _ball(report: dict[str, Any]) -> str:
 
 def _tables(report: dict[str, Any], key: str) -> list[dict[str, Any]]:
     return [item for item in report.get(key, []) if isinstance(item, dict)]
+
+
+def _cell(entry: dict[str, Any]) -> str:
+    """Return the value of a criterion, and whether it fails or is undecided."""
+    verdict = entry["verdict"]
+    if verdict == VERDICTS[0] or entry["value"] is None:
+        return value_text(entry)
+    state = "low" if entry["value"] < entry["lower"] else "high"
+    return Result(f"{value_text(entry)} {state if verdict == VERDICTS[1] else verdict}", verdict)
 
 
 def _degrees(value: float | None) -> str:
@@ -346,23 +342,24 @@ def _read(path: Path) -> tuple[datetime, dict[str, Any]]:
 
 def _is_complete(report: dict[str, Any]) -> bool:
     """Whether a report has all entries that a history needs, each of its type."""
-    criteria: Any = report.get("criteria")
-    return (
-        all(isinstance(report.get(key), str) for key in TEXTS)
-        and all(isinstance(report.get(key, []), list) for key in ("instruments", "files"))
-        and isinstance(criteria, list)
-        and bool(criteria)
-        and all(isinstance(entry, dict) and _is_criterion(entry) for entry in criteria)
-    )
+    try:
+        return (
+            all(isinstance(report[key], str) for key in TEXTS)
+            and all(isinstance(report.get(key, []), list) for key in ("instruments", "files"))
+            and bool(report["criteria"])
+            and all(map(_is_criterion, report["criteria"]))
+        )
+    except (KeyError, TypeError):
+        return False
 
 
 def _is_criterion(entry: dict[str, Any]) -> bool:
     return (
-        isinstance(entry.get("name"), str)
-        and isinstance(entry.get("upper_bound"), bool)
-        and entry.get("verdict") in VERDICTS
-        and all(_is_number(entry.get(key)) for key in LIMITS)
-        and all(entry.get(key, "") is None or _is_number(entry.get(key)) for key in VALUES)
+        isinstance(entry["name"], str)
+        and isinstance(entry["upper_bound"], bool)
+        and entry["verdict"] in VERDICTS
+        and all(_is_number(entry[key]) for key in LIMITS)
+        and all(entry[key] is None or _is_number(entry[key]) for key in VALUES)
     )
 
 
