@@ -35,13 +35,17 @@ from thud.level.levels import get_bands
 from thud.level.rating import class_text
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
+
+    from numpy.typing import NDArray
 
     from thud.base._schema import FloorOptions
+    from thud.base.display import Columns
     from thud.base.key import Key
     from thud.case.constructions import Construction
     from thud.floors.prediction import RoomPrediction
 
+    Array = NDArray[np.float64]
     Cells = tuple[str | float, ...]
 
 
@@ -231,29 +235,29 @@ class PredictedFloor:
         result.sort(key=lambda change: (np.isnan(change.difference), -abs(change.difference)))
         return tuple(result)
 
-    @property
-    def force_levels(self) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-        """Force exposure levels of the used force, dB re 1 N, shape (12,)."""
-        levels = self.prediction.source.levels(BANDS, force="floor")
-        return np.asarray(levels[np.isin(get_bands(BANDS).nominal, self.prediction.frequency)])
+    def columns(self) -> Columns:
+        """Return the levels in bands, and what they follow from; NaN where edges do not matter."""
+        prediction = self.prediction
+        levels = prediction.source.levels(BANDS, force="floor")
+        rated = np.isin(get_bands(BANDS).nominal, prediction.frequency)
+        matters = prediction.simple_level != prediction.clamped_level
 
+        def of_edges(level: Array) -> Array:
+            return np.where(matters, level, np.nan)
 
-# Title with unit, decimals or significant digits on the page, and value of each column of bands.
-COLUMNS: dict[str, tuple[str, Callable[[PredictedFloor], Iterable[float]]]] = {
-    "force level, dB re 1 N, 1 s": (".1f", lambda floor: floor.force_levels),
-    "energy into the bearing floor, µJ": ("#.3g", lambda floor: 1e6 * floor.prediction.energy),
-    "radiation factor": ("#.3g", lambda floor: floor.prediction.radiation_factor),
-    "loss factor": (".3f", lambda floor: floor.prediction.loss_factor),
-    "T, s": (".2f", lambda floor: floor.prediction.reverberation_time),
-    "level, dB": (".1f", lambda floor: floor.prediction.level),
-    "standard uncertainty, dB": (".1f", lambda floor: floor.prediction.uncertainty),
-    "simply supported, dB": (".1f", lambda floor: floor.prediction.simple_level),
-    "clamped, dB": (".1f", lambda floor: floor.prediction.clamped_level),
-    "standardized, dB": (".1f", lambda floor: floor.prediction.standardized),
-}
-
-# Columns of bands in which the support of the edges matters.
-_OF_EDGES = ("simply supported, dB", "clamped, dB")
+        return {
+            "band, Hz": (prediction.frequency, "g"),
+            "force level, dB re 1 N, 1 s": (levels[rated], ".1f"),
+            "energy into the bearing floor, µJ": (1e6 * prediction.energy, "#.3g"),
+            "radiation factor": (prediction.radiation_factor, "#.3g"),
+            "loss factor": (prediction.loss_factor, ".3f"),
+            "T, s": (prediction.reverberation_time, ".2f"),
+            "level, dB": (prediction.level, ".1f"),
+            "standard uncertainty, dB": (prediction.uncertainty, ".1f"),
+            "simply supported, dB": (of_edges(prediction.simple_level), ".1f"),
+            "clamped, dB": (of_edges(prediction.clamped_level), ".1f"),
+            "standardized, dB": (prediction.standardized, ".1f"),
+        }
 
 
 def remedy(prediction: RoomPrediction) -> str:
@@ -290,25 +294,12 @@ def number_text(value: float, form: str = ".3g") -> str:
 
 def band_rows(floor: PredictedFloor) -> list[tuple[str, ...]]:
     """Return the bands as rows of text, the header first."""
+    columns = floor.columns()
     cells = [
-        ["–" if isinstance(value, str) else number_text(value, form) for value in column]
-        for (form, _), column in zip(COLUMNS.values(), _columns(floor), strict=True)
+        ["–" if np.isnan(value) else number_text(value, form) for value in values]
+        for values, form in columns.values()
     ]
-    bands = (f"{frequency:g}" for frequency in floor.prediction.frequency)
-    return [("band, Hz", *COLUMNS), *zip(bands, *cells, strict=True)]
-
-
-def _columns(floor: PredictedFloor) -> list[list[float | str]]:
-    """Return the columns of bands; an empty text where the support of the edges does not matter."""
-    prediction = floor.prediction
-    matters = prediction.simple_level != prediction.clamped_level
-    return [
-        [
-            "" if title in _OF_EDGES and not known else float(value)
-            for value, known in zip(values(floor), matters, strict=True)
-        ]
-        for title, (_, values) in COLUMNS.items()
-    ]
+    return [tuple(columns), *zip(*cells, strict=True)]
 
 
 def tables(floors: Sequence[PredictedFloor], *, changes: bool) -> dict[str, list[Cells]]:
@@ -326,7 +317,7 @@ def _tables(
 ) -> dict[str, tuple[Sequence[str], Iterable[Iterable[str | float]]]]:
     """Return titles and rows of each table of a floor."""
     prediction, required = floor.prediction, floor.prediction.requirement
-    bands = prediction.frequency.tolist()
+    columns, bands = floor.columns(), prediction.frequency.tolist()
     by_modes = [float(i < prediction.n_modal) for i in range(len(bands))]
     texts = [("required", required.limit, "", verdict_text(prediction))] if required else []
     shares = zip([*bands, "A"], [*prediction.path_shares, prediction.weighted_shares], strict=True)
@@ -334,8 +325,8 @@ def _tables(
     changed: list[Change] = [*floor.changes] if changes else []
     return {
         "bands": (
-            ("band, Hz", *COLUMNS, "by modes"),
-            zip(bands, *_columns(floor), by_modes, strict=True),
+            (*columns, "by modes"),
+            zip(*(_cells(values) for values, _ in columns.values()), by_modes, strict=True),
         ),
         "octaves": (octave_titles(), [prediction.octave_level.tolist()]),
         "ratings": (("rating", "value, dB", deviation, "text"), [*floor.ratings, *texts]),
@@ -349,6 +340,11 @@ def _tables(
         "assumptions": (("quantity", "value", "source"), floor.assumptions[1:]),
         "warnings": (("warning",), [(str(note),) for note in prediction.notes]),
     }
+
+
+def _cells(values: Iterable[float]) -> list[float | str]:
+    """Return numbers for a table; an empty text for NaN."""
+    return ["" if np.isnan(value) else float(value) for value in values]
 
 
 def octave_titles() -> list[str]:
