@@ -65,7 +65,7 @@ def floors() -> Figure:
 def comparison() -> Figure:
     """Draw four models."""
     paths = sorted((INPUTS / "comparison").glob("*.nml"))
-    return thud.compare({path.stem: thud.read_case(path) for path in paths}).figure()
+    return thud.compare({path.stem: thud.read_case(path) for path in paths}).plot()
 
 
 def plate_velocity() -> Figure:

@@ -15,7 +15,6 @@ import thud
 from thud import cli
 from thud.base._schema import QUANTITIES
 from thud.base.errors import PlausibilityWarning
-from thud.base.key import Quantity
 from thud.comparison.comparison import _cell, read_all
 from thud.level.assessment import Criterion
 from thud.recordings.config import Config
@@ -108,7 +107,7 @@ def test_page_and_table_have_the_levels_of_the_case() -> None:
     case = thud.Case(levels=thud.Levels(method="fft", force="elastic"), model=thud.HollowSphere())
     comparison = thud.compare({"shell": case})
     expected = thud.solve(model="hollow_sphere").levels("octave", "fft", "elastic")
-    octaves = comparison.figure().axes[1]
+    octaves = comparison.plot().axes[1]
     drawn = next(line for line in octaves.lines if len(line.get_ydata()) == len(expected))
     np.testing.assert_array_equal(drawn.get_ydata(), expected)
     assert column(comparison)["31.5 Hz, dB"] == f"{expected[0]:.2f}"
@@ -237,20 +236,19 @@ def test_case_that_fails_is_named() -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "uncertainty", "scale", "decimals", "cell"),
+    ("name", "value", "uncertainty", "cell"),
     [
-        (38.1, 0, 10.0, 2, "381.00"), (37.9, 0, 1.0, 1, "37.9 low"),
-        (40.1, 0, 1.0, 1, "40.1 high"), (40.1, 1, 1.0, 1, "40.1 undecided"),
-        (38.0, 0.1, 1.0, 1, "38.0 undecided"), (40.0, 0.1, 1.0, 1, "40.0 undecided"),
-        (np.nan, 0, 1.0, 1, "unknown"),
+        ("octave_31_5", 38.1, 0, "38.10"), ("octave_31_5", 37.9, 0, "37.90 low"),
+        ("octave_31_5", 40.1, 0, "40.10 high"), ("octave_31_5", 40.1, 1, "40.10 undecided"),
+        ("octave_31_5", 38.0, 0.1, "38.00 undecided"), ("octave_31_5", np.nan, 0, "unknown"),
+        ("mass", 38.12345, 0, "38.123"), ("contact_time", 38.5, 0, "38500.00"),
+        ("margin", -0.001, 0, "0.00 low"),
     ],
 )  # fmt: skip
 def test_cell_tells_how_a_criterion_is_missed(
-    value: float, uncertainty: float, scale: float, decimals: int, cell: str
+    name: str, value: float, uncertainty: float, cell: str
 ) -> None:
-    quantity = Quantity("", "", "", "dB", "dB", scale, decimals, "")
-    criterion = Criterion("octave_31_5", thud.Estimate(value, uncertainty), 38.0, 40.0)
-    assert _cell(criterion, quantity) == cell
+    assert _cell(Criterion(name, thud.Estimate(value, uncertainty), 38.0, 40.0)) == cell
 
 
 def test_small_values_have_three_digits() -> None:

@@ -13,8 +13,6 @@ import pytest
 from test_figure_look import assert_clean
 
 import thud
-from thud.base._schema import QUANTITIES
-from thud.comparison.comparison import _cell
 from thud.plot.pages import comparison_figure, comparison_html
 from thud.plot.style import WIDTH
 
@@ -85,11 +83,6 @@ def test_picture_is_a_column_wide_for_any_number_of_cases(count: int) -> None:
     figure = comparison_figure(dict.fromkeys(names, SHELL), None, "rubber_ball")
     assert figure.get_figwidth() == pytest.approx(WIDTH)
     assert_clean(figure)
-
-
-def test_no_cell_is_minus_zero() -> None:
-    criterion = thud.Criterion("level", thud.Estimate(-0.001), -1.0, 1.0)
-    assert _cell(criterion, QUANTITIES["margin"]) == "0.00"
 
 
 @contextmanager

@@ -61,7 +61,7 @@ for figure in (
     pressed.plot(),
     record.plot("force"),
     thud.plot.levels(impacts),
-    page.figure(),
+    page.plot(),
 ):
     thud.plot.save(figure, folder / "figure.png")
 tables = (

@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from thud.base._schema import LevelsForce, LimitsSource
-    from thud.base.key import Quantity
     from thud.level.assessment import Criterion
     from thud.recordings.recording import ImpactResult
 
@@ -42,6 +41,12 @@ if TYPE_CHECKING:
 NAMELISTS = (".nml", ".namelist", "")
 # Relative tolerance of the velocity of a recording, for a drop height of at least 0.85 m ± 1 cm.
 VELOCITY_TOLERANCE = 0.015
+# Quantities that are no criteria.
+_OTHERS = [
+    name
+    for name in SAMPLE_QUANTITIES
+    if name not in {"peak_force", "peak_elastic_force", *(name for name, *_ in LIMITS[SOURCES[0]])}
+]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -84,30 +89,35 @@ class Comparison(Displayed, Page):
 
         Each impact has a column; the last column has the limits.
         """
-        impacts = self.impacts.values()
-        verdicts = [impact.assess(self.source, self.force) for impact in impacts]
-        criteria = list(zip(*(verdict.criteria for verdict in verdicts), strict=True))
-        times = [self.run_times.get(name) for name in self.impacts]
-        peak = QUANTITIES["peak_force"]
-        rows = [
-            ("", *self.impacts),
-            ("assessed force", *(impact.assessed_force(self.force) for impact in impacts)),
-            ("method of levels", *(impact.case.levels.method for impact in impacts)),
-            *(_criterion_row(row) for row in criteria),
-            (peak.label, *(peak.show(impact.peak(self.force)) for impact in impacts)),
-            *_quantity_rows(impacts),
+        columns = [self._column(name) for name in self.impacts]
+        criteria = next(iter(self.impacts.values())).assess(self.source, self.force).criteria
+        limits = {criterion.quantity.label: criterion.shown_limits for criterion in criteria}
+        rows: list[tuple[str, ...]] = [
+            ("", *self.impacts, f"limits, {self.source.replace('_', ' ')}")
         ]
-        if any(times):
-            rows.append(("computing time, ms", *(f"{1e3 * t:.3g}" if t else "" for t in times)))
-        rows.append(("verdict", *(Result(v.conforms, v.conforms) for v in verdicts)))
-        # The criteria are the rows after the first three; the verdict is the last row.
-        blank = [""] * (len(rows) - 4 - len(criteria))
-        limits = (row[0].shown_limits for row in criteria)
-        column = [f"limits, {self.source.replace('_', ' ')}", "", "", *limits, *blank, ""]
-        return [(*row, cell) for row, cell in zip(rows, column, strict=True)]
+        for title in columns[0]:
+            cells = [column[title] for column in columns]
+            if any(cells):
+                rows.append((title, *cells, limits.get(title, "")))
+        return rows
 
-    def figure(self) -> Figure:
-        """Return forces and levels as a matplotlib figure."""
+    def _column(self, name: str) -> dict[str, str]:
+        """Return the cells of an impact by their titles."""
+        impact, seconds = self.impacts[name], self.run_times.get(name)
+        verdict = impact.assess(self.source, self.force)
+        peak, others = QUANTITIES["peak_force"], map(QUANTITIES.__getitem__, _OTHERS)
+        return {
+            "assessed force": impact.assessed_force(self.force),
+            "method of levels": impact.case.levels.method,
+            **{criterion.quantity.label: _cell(criterion) for criterion in verdict.criteria},
+            peak.label: peak.show(impact.peak(self.force)),
+            **{other.label: other.show(impact.quantity(other.name)) for other in others},
+            "computing time, ms": f"{1e3 * seconds:.3g}" if seconds else "",
+            "verdict": Result(verdict.conforms, verdict.conforms),
+        }
+
+    def plot(self) -> Figure:
+        """Draw forces and levels."""
         return comparison_figure(self.impacts, self.force, self.source)
 
     def html(self) -> str:
@@ -116,38 +126,19 @@ class Comparison(Displayed, Page):
 
     def files(self) -> dict[str, bytes]:
         """Return ``comparison.svg`` and ``comparison.html`` by name."""
-        return page_files("comparison", self.figure, self.html())
+        return page_files("comparison", self.plot, self.html())
 
 
-def _criterion_row(criteria: tuple[Criterion, ...]) -> tuple[str, ...]:
-    quantity = criteria[0].quantity
-    return (quantity.label, *(_cell(criterion, quantity) for criterion in criteria))
-
-
-def _cell(criterion: Criterion, quantity: Quantity) -> str:
+def _cell(criterion: Criterion) -> str:
     """Return the value of a criterion, and whether it is too low, too high or undecided."""
     if np.isnan(criterion.value):
         return "unknown"
-    conforms, fails, _ = VERDICTS
-    if criterion.conforms == conforms:
-        state = ""
-    elif criterion.conforms == fails:
-        state = "low" if criterion.value < criterion.lower else "high"
-    else:
-        state = "undecided"
-    text = f"{criterion.value * quantity.display_scale:z.{quantity.decimals}f} {state}".rstrip()
-    return Result(text, criterion.conforms) if state else text
-
-
-def _quantity_rows(impacts: Iterable[ImpactResult]) -> list[tuple[str, ...]]:
-    """Return rows of the known quantities that have no other row."""
-    other_rows = {"peak_force", "peak_elastic_force", *(name for name, *_ in LIMITS[SOURCES[0]])}
-    rows = []
-    for name in SAMPLE_QUANTITIES:
-        values = [impact.quantity(name) for impact in impacts]
-        if name not in other_rows and not np.isnan(values).all():
-            rows.append((QUANTITIES[name].label, *map(QUANTITIES[name].show, values)))
-    return rows
+    quantity, verdict = criterion.quantity, criterion.conforms
+    text = f"{criterion.value * quantity.display_scale:z.{quantity.decimals}f}"
+    if verdict == VERDICTS[0]:
+        return text
+    state = "low" if criterion.value < criterion.lower else "high"
+    return Result(f"{text} {state if verdict == VERDICTS[1] else verdict}", verdict)
 
 
 # mypy infers the type of a dictionary of several kinds from the parameter of an overload only.

@@ -34,7 +34,7 @@ from thud.plot.style import (
 from thud.plot.templates import render
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
@@ -45,10 +45,12 @@ if TYPE_CHECKING:
     from thud.floors.prediction import RoomPrediction
     from thud.recordings.recording import ImpactResult
 
+    Array = NDArray[np.float64]
+
 # Scripts and style of plots, which the explorer shares. The page is one script: its parts neither
 # import nor export.
 _SHARED = resources.files("thud") / "explorer/page"
-_SCRIPTS, _STYLE = ("page.js", "plot.js"), "plot.css"
+_SCRIPTS = ("page.js", "plot.js")
 _MODULE = re.compile(r"^(?:import .*\n|export )", re.MULTILINE)
 
 
@@ -63,10 +65,7 @@ def html_page(
 
     Plots are as `plot` of ``explorer/page/plot.js`` takes them; the first has the full width.
     """
-    script, style = (
-        "".join((_SHARED / name).read_text(encoding="utf-8") for name in names)
-        for names in (_SCRIPTS, (_STYLE,))
-    )
+    script = "".join((_SHARED / name).read_text(encoding="utf-8") for name in _SCRIPTS)
     return render(
         "plot/page.html",
         title=title,
@@ -74,21 +73,39 @@ def html_page(
         table=table,
         warnings=warnings,
         plots=plots,
-        style=style,
+        style=(_SHARED / "plot.css").read_text(encoding="utf-8"),
         script=_MODULE.sub("", script),
     )
 
 
-def _curve(i: int, name: str, x: Iterable[float], y: Iterable[float], *, marks: bool) -> object:
-    """Return a curve of a page by its index, with values of six digits; NaN is a gap."""
-    values = [float(f"{value:.6g}") + 0.0 if np.isfinite(value) else None for value in y]
-    return {"name": name, "style": i, "x": list(x), "y": values, "marks": marks}
+def _plot(
+    x: Mapping[str, Any], y: Mapping[str, str], curves: Mapping[str, tuple[Array, Array]]
+) -> dict[str, Any]:
+    """Return a plot of curves by name, with values of six digits; NaN is a gap."""
+    return {
+        "x": x,
+        "y": y,
+        "curves": [
+            {
+                "name": name,
+                "style": i,
+                "x": horizontal.tolist(),
+                "y": [float(f"{v:.6g}") + 0.0 if np.isfinite(v) else None for v in values],
+                "marks": "bands" in x,
+            }
+            for i, (name, (horizontal, values)) in enumerate(curves.items())
+        ],
+    }
 
 
-def _band_axis(frequency: NDArray[np.float64], bands: BandSet) -> dict[str, Any]:
-    """Return the x axis of a plot of a page against bands."""
+def _bands_plot(
+    frequency: Array, bands: BandSet, y: Mapping[str, str], curves: Mapping[str, Array]
+) -> dict[str, Any]:
+    """Return a plot of levels against bands."""
     names = [f"{value:g}" for value in frequency]
-    return {"title": BAND_NAMES[bands], "unit": "Hz", "bands": names}
+    x = {"title": BAND_NAMES[bands], "unit": "Hz", "bands": names}
+    indices = np.arange(len(names), dtype=np.float64)
+    return _plot(x, y, {name: (indices, values) for name, values in curves.items()})
 
 
 @own_style()
@@ -124,27 +141,17 @@ def comparison_html(
     """
     curves, name = assessed_curves(impacts, force)
     level_title = "Force exposure level" + f" ({name})" * (name != "force")
-    forces = {
-        "x": {"title": "Time since first touch", "unit": "ms"},
-        "y": {"title": f"{name.capitalize()}, low-passed at 1.25 kHz", "unit": "kN"},
-        "curves": [
-            _curve(i, label, *contact_force(*curve), marks=False)
-            for i, (label, curve) in enumerate(curves.items())
-        ],
-    }
+    forces = _plot(
+        {"title": "Time since first touch", "unit": "ms"},
+        {"title": f"{name.capitalize()}, low-passed at 1.25 kHz", "unit": "kN"},
+        {label: contact_force(*curve) for label, curve in curves.items()},
+    )
+    y = {"title": level_title, "unit": "dB", "reference": " re 1 N, 1 s"}
     bands: tuple[BandSet, ...] = ("octave", "third")
-    levels = [
-        {
-            "x": _band_axis(get_bands(band_set).nominal, band_set),
-            "y": {"title": level_title, "unit": "dB", "reference": " re 1 N"},
-            "curves": [
-                _curve(i, label, range(len(level)), level, marks=True)
-                for i, (label, (impact, kind)) in enumerate(curves.items())
-                for level in [impact.levels(band_set, force=kind)]
-            ],
-        }
-        for band_set in bands
-    ]
+    levels = []
+    for kind in bands:
+        curve = {name: impact.levels(kind, force=force) for name, (impact, force) in curves.items()}
+        levels.append(_bands_plot(get_bands(kind).nominal, kind, y, curve))
     levels[0]["limits"] = np.transpose(octave_limits(source)).tolist()
     return html_page(
         "Comparison of models and recordings",
@@ -158,7 +165,7 @@ def comparison_html(
 
 # Titles, units and references of the steps from force to room.
 _STEPS = (
-    ("Force exposure\nlevel", "dB", " re 1 N"),
+    ("Force exposure\nlevel", "dB", " re 1 N, 1 s"),
     ("Energy input", "dB", " re 1 J"),
     ("Radiated share\nof the losses", "%", ""),
     ("Maximum Fast level", "dB", " re 20 µPa"),
@@ -204,14 +211,12 @@ def floors_html(comparison: FloorComparison) -> str:
     predictions = comparison.predictions
     steps = zip(*map(_step_values, predictions.values()), strict=True)
     plots = [
-        {
-            "x": _band_axis(next(iter(predictions.values())).frequency, "third"),
-            "y": {"title": title.replace("\n", " "), "unit": unit, "reference": reference},
-            "curves": [
-                _curve(i, name, range(len(y)), y, marks=True)
-                for i, (name, y) in enumerate(zip(predictions, values, strict=True))
-            ],
-        }
+        _bands_plot(
+            next(iter(predictions.values())).frequency,
+            "third",
+            {"title": title.replace("\n", " "), "unit": unit, "reference": reference},
+            dict(zip(predictions, values, strict=True)),
+        )
         for (title, unit, reference), values in zip(_STEPS, steps, strict=True)
     ]
     text = "Levels in the room below, and the chain that leads to them: force, energy, floor, room."
@@ -221,7 +226,7 @@ def floors_html(comparison: FloorComparison) -> str:
     return html_page("Comparison of floors", text, comparison.rows(), plots, warnings)
 
 
-def _step_values(prediction: RoomPrediction) -> tuple[NDArray[np.float64], ...]:
+def _step_values(prediction: RoomPrediction) -> tuple[Array, ...]:
     """Return the values of each step of a prediction."""
     energy = 10 * np.log10(prediction.energy)
     force = energy - 10 * np.log10(prediction.conductance)

@@ -100,7 +100,7 @@ def criteria_csv(data: dict[str, Any]) -> str:
         for criterion in data["criteria"]
     ]
     head = "criterion unit value upper_bound uncertainty lower upper margin verdict"
-    comment = f"# thud {version()}; SI units, levels in dB re 1 N; uncertainty expanded, 95 %\n"
+    comment = f"# thud {version()}; SI units, levels in dB re 1 N, 1 s; uncertainty: U (95 %)\n"
     return comment + csv_text([head.split(), *rows])
 
 
