@@ -490,17 +490,10 @@ def test_figures_show_every_drop_the_average_and_the_limits(one: Recording, coun
         np.testing.assert_allclose(half, [one.expanded for one in recording.level_estimates(bands)])
 
 
-def test_levels_and_criteria_agree_on_uncertainty(one: Recording) -> None:
-    plate = Plate(f0=1600.0, Q=20.0, f0_uncertainty=0.005)
-    for recording in (one, many(one, 5), many(one, 5, plate=plate)):
-        data = report_data(recording)
-        found = data["levels"]["octave"]
-        for i, decision in enumerate(recording.assess().criteria[:5]):
-            assert found["uncertainty"][i] == decision.estimate.uncertainty
-            assert found["expanded_uncertainty"][i] == decision.estimate.expanded
-    octaves, thirds = (recording.level_estimates(bands) for bands in ("octave", "third"))
-    for budgets in (octaves, thirds):
-        names = [part.name for part in budgets[-1].contributions]
+def test_levels_of_all_bands_have_the_same_contributions(one: Recording) -> None:
+    recording = many(one, 5, plate=Plate(f0=1600.0, Q=20.0, f0_uncertainty=0.005))
+    for bands in ("octave", "third"):
+        names = [part.name for part in recording.level_estimates(bands)[-1].contributions]
         assert names[-4:] == [
             "calibration", "plate", "share of the plate's resonance, assumed",
             "recorder filter, assumed",

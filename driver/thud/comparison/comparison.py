@@ -18,7 +18,7 @@ from tqdm import tqdm
 from thud.base._schema import LIMITS, QUANTITIES, SAMPLE_QUANTITIES, VERDICTS
 from thud.base.checks import refuse, refuse_value, require_choice, require_kind
 from thud.base.display import Displayed
-from thud.base.errors import InputError, PlausibilityWarning, ThudError
+from thud.base.errors import PlausibilityWarning, ThudError
 from thud.base.files import Page
 from thud.base.tables import Result
 from thud.case.case import Case, read_case
@@ -272,19 +272,14 @@ def read_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Case | Impact
     InputError
         If a file cannot be read, or two have the same name.
     """
+    # SciPy is slow to import.
+    from thud.recordings.read_recording import read_recording
+
     items: dict[str, Case | ImpactResult] = {}
     for path in map(Path, paths):
-        item: Case | ImpactResult
-        if path.suffix.lower() in NAMELISTS:
-            item = read_case(path)
-        else:
-            # SciPy is slow to import.
-            from thud.recordings.read_recording import read_recording
-
-            item = read_recording(path)
-        name = item.name
-        if name in items:
-            message = f"{path}: {name!r} also names another input; allowed: different names"
-            raise InputError(message)
-        items[name] = item
+        is_case = path.suffix.lower() in NAMELISTS
+        item: Case | ImpactResult = read_case(path) if is_case else read_recording(path)
+        if item.name in items:
+            refuse(f"{path}: {item.name!r} also names another input", "different names")
+        items[item.name] = item
     return items

@@ -7,9 +7,9 @@ import math
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 from functools import cached_property
-from itertools import chain, pairwise
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy.special import stdtrit
@@ -72,8 +72,7 @@ class Trend(Immutable):
     value: NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class ControlLimits:
+class ControlLimits(NamedTuple):
     """Mean and standard deviation of a criterion, by the moving range of consecutive values."""
 
     mean: float
@@ -179,19 +178,10 @@ class History:
 
     @property
     def calibrations(self) -> list[datetime]:
-        """Dates of the calibrations of instruments, between first and last report.
-
-        They are the dates of the certificates; a report whose calibration factor differs from that
-        of the report before it counts as a calibration, too.
-        """
-        instruments = chain.from_iterable(_tables(r, "instruments") for r in self.reports)
-        dates = {read_date(str(item.get("calibrated", ""))) for item in instruments}
-        factors = [
-            {str(file.get("calibration", "")) for file in _tables(report, "files")}
-            for report in self.reports
-        ]
-        pairs = zip(self.dates[1:], pairwise(factors), strict=True)
-        dates |= {date for date, (before, after) in pairs if before != after}
+        """Dates of the certificates of instruments, between first and last report."""
+        instruments = chain.from_iterable(report.get("instruments", []) for report in self.reports)
+        texts = (item.get("calibrated", "") for item in instruments if isinstance(item, dict))
+        dates = {read_date(str(text)) for text in texts}
         return sorted(date for date in dates if date and self.dates[0] <= date <= self.dates[-1])
 
     def table(self) -> list[tuple[str, ...]]:
@@ -241,10 +231,6 @@ class History:
 def _ball(report: dict[str, Any]) -> str:
     """Return name and serial number of the ball of a report."""
     return " ".join(filter(None, (report["ball"], report["serial"])))
-
-
-def _tables(report: dict[str, Any], key: str) -> list[dict[str, Any]]:
-    return [item for item in report.get(key, []) if isinstance(item, dict)]
 
 
 def _cell(entry: dict[str, Any]) -> str:
@@ -345,7 +331,7 @@ def _is_complete(report: dict[str, Any]) -> bool:
     try:
         return (
             all(isinstance(report[key], str) for key in TEXTS)
-            and all(isinstance(report.get(key, []), list) for key in ("instruments", "files"))
+            and isinstance(report.get("instruments", []), list)
             and bool(report["criteria"])
             and all(map(_is_criterion, report["criteria"]))
         )

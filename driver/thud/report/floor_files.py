@@ -80,7 +80,7 @@ def page_contents(floor: PredictedFloor, folder: Path) -> dict[str, bytes]:
     from thud.plot.floor_figures import draw_section
     from thud.plot.room_figures import draw_levels
     from thud.plot.save_figures import figure_files
-    from thud.report.floor_page import floor_page, page_texts
+    from thud.report.floor_page import floor_page
     from thud.report.pdf import pdf_file
 
     figures = figure_files(
@@ -91,7 +91,7 @@ def page_contents(floor: PredictedFloor, folder: Path) -> dict[str, bytes]:
     )  # fmt: skip
     section, levels = (figures.get(f"{name}.svg", b"") for name in ("section", "levels"))
     page = floor_page(floor, section, levels)
-    printed = pdf_file(page, f"{floor.file}.pdf", folder, page_texts(floor))
+    printed = pdf_file(page, f"{floor.file}.pdf", folder)
     return {f"{floor.file}.html": page.encode(), **printed}
 
 

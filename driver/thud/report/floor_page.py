@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import zip_longest
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -67,13 +68,6 @@ def floor_page(floor: PredictedFloor, section: bytes, figure: bytes) -> str:
     )
 
 
-def page_texts(floor: PredictedFloor) -> str:
-    """Return the texts of a page that users have stated, in any script."""
-    texts = [floor.name, *(layer.description for layer in floor.layers)]
-    texts += [text for row in [*floor.details, *floor.assumptions] for text in row]
-    return "".join(texts + ([floor.construction.note] if floor.construction else []))
-
-
 def _box(floor: PredictedFloor) -> list[str]:
     """Return the lines below the rating."""
     prediction = floor.prediction
@@ -90,19 +84,15 @@ def _box(floor: PredictedFloor) -> list[str]:
 
 def _mode_rows(prediction: RoomPrediction) -> list[tuple[str, ...]]:
     """Return the lowest natural frequencies of floor and room, Hz."""
-    floor, room = floor_frequencies(prediction), room_frequencies(prediction)
-    numbers = range(1, max(len(floor), len(room)) + 1)
+    room = room_frequencies(prediction)
     rows = {
-        "Floor": [f"{frequency:.1f}" for frequency in floor],
+        "Floor": [f"{frequency:.1f}" for frequency in floor_frequencies(prediction)],
         "Room": [f"{frequency:.1f}" for frequency in room.values()],
-        "Half wavelengths along length, width, height": [
-            ", ".join(map(str, order)) for order in room
-        ],
+        "Half wavelengths along length, width, height": [", ".join(map(str, o)) for o in room],
     }
-    padded = (
-        (title, *cells, *["–"] * (len(numbers) - len(cells))) for title, cells in rows.items()
-    )
-    return [("", *map(str, numbers)), *padded]
+    columns = [*zip_longest(*rows.values(), fillvalue="–")]
+    cells = zip(rows, *columns, strict=True)
+    return [("", *(str(i) for i in range(1, len(columns) + 1))), *cells]
 
 
 def _about(floor: PredictedFloor) -> dict[str, str]:
@@ -116,31 +106,25 @@ def _about(floor: PredictedFloor) -> dict[str, str]:
     kind = humanize(source.limits_source or "source that is not stated")
     # A recording has no case of its own, only the velocity.
     drop = f" dropped from {case.drop.height:.3g} m" if case.model else ""
-    limits = f"limits of the {kind}"
     model = humanize(case.model.name) if case.model else "recording or measured modes"
-    forces = {
-        "contact": "on the mobile floor",
-        "blocked": "on a rigid floor",
+    where = "the mobile floor" if prediction.force == "contact" else "a rigid floor"
+    speed = f"{source.impact_velocity:.3g} m/s"
+    levels = (
+        "do not conform: see warnings" if prediction.source_notes else "conform to the standards"
+    )
+    walls = f"A-weighted energy: {floor.path_shares}" if room.wall_lengths else "none described"
+    pairs = {
+        "Room": f"{sides} m, {number_text(prediction.volume)} m³",
+        "Reverberation": f"T = {time} s, of the {humanize(room.reverberation_of)} room",
+        "Flanking walls": walls,
+        "Ceiling": _ceiling(prediction),
+        "Source": f"{source.mass:.3g} kg{drop}, {speed}; limits of the {kind}",
+        "Source levels": levels,
+        "Source model": f"{model}; force on {where}",
     }
-    conforms = not prediction.source_notes
-    pairs = [
-        ("Room", f"{sides} m, {number_text(prediction.volume)} m³"),
-        ("Reverberation", f"T = {time} s, of the {humanize(room.reverberation_of)} room"),
-        (
-            "Flanking walls",
-            f"A-weighted energy: {floor.path_shares}" if room.wall_lengths else "none described",
-        ),
-        ("Ceiling", _ceiling(prediction)),
-        ("Source", f"{source.mass:.3g} kg{drop}, {source.impact_velocity:.3g} m/s; {limits}"),
-        (
-            "Source levels",
-            "conform to the standards" if conforms else "do not conform: see warnings",
-        ),
-        ("Source model", f"{model}; force {forces[prediction.force]}"),
-    ]
     if floor.construction and floor.construction.note:
-        pairs.append(("Note", floor.construction.note))
-    return dict(pairs)
+        pairs["Note"] = floor.construction.note
+    return pairs
 
 
 def _ceiling(prediction: RoomPrediction) -> str:

@@ -5,15 +5,12 @@ from __future__ import annotations
 import hashlib
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from thud.base._schema import QUANTITIES, VERDICTS
-from thud.plot.templates import plain, render
-from thud.recordings.measured_drop import ESTIMATES
+from thud.plot.templates import render
 from thud.recordings.recorded_levels import BACKGROUND
 from thud.report.contents import json_bytes
 from thud.report.rows import (
     COUNT,
     HEAD,
-    INCOMPLETE,
     NOT_KNOWN,
     capital,
     criterion_row,
@@ -23,12 +20,13 @@ from thud.report.rows import (
     freedom_text,
     number,
     quantity_of,
+    reason_text,
     value_text,
     width_text,
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable
 
 # Maximum number of characters of the name at the foot of each page.
 MAX_IDENTITY = 70
@@ -95,7 +93,7 @@ def report_page(
         data=data,
         checksum=checksum,
         mark=mark,
-        reason=_reason(criteria),
+        reason=reason_text(criteria),
         about=_about(data),
         measured=_measured(data),
         head=HEAD,
@@ -117,30 +115,6 @@ def report_page(
         properties=_properties(data["properties"]),
         issued=", ".join(filter(None, [report["place"], report["issued"]])),
     )
-
-
-def laboratory_text(data: dict[str, Any]) -> str:
-    """Return the texts that the laboratory stated, in any script."""
-    keys = ("laboratory", "ball", "serial", "date", "name")
-    texts = [data[key] for key in keys]
-    texts += [file[key] for file in data["files"] for key in ("name", "calibration")]
-    tables = [data["report"], data["properties"], *data["instruments"]]
-    for value in (value for table in tables for value in table.values()):
-        texts += value if isinstance(value, tuple) else [value] if isinstance(value, str) else []
-    return plain("".join(texts))
-
-
-def _reason(criteria: Sequence[dict[str, Any]]) -> str:
-    """Return the criteria that are undecided or not met, and whether U is incomplete."""
-    parts = []
-    for verdict in VERDICTS[1:]:
-        matching = [criterion for criterion in criteria if criterion["verdict"] == verdict]
-        if names := [quantity_of(criterion).title for criterion in matching]:
-            parts.append(f"{verdict}: {', '.join(names)}")
-    parts = parts or ["all criteria are met"]
-    if any(criterion["excluded"] for criterion in criteria):
-        parts.append(f"U is incomplete where it is marked {INCOMPLETE}")
-    return "; ".join(parts)
 
 
 def _about(data: dict[str, Any]) -> dict[str, str]:
@@ -284,29 +258,9 @@ def range_picture(criterion: dict[str, Any]) -> RangePicture | None:
     return RangePicture(min(max(position, left), right), low, high, side)
 
 
-def _means(drops: Sequence[dict[str, Any]]) -> Iterable[str]:
-    """Yield the means over the drops that are no rows of the table of criteria."""
-    means = []
-    for name in ESTIMATES:
-        known = [drop[name]["value"] for drop in drops if drop[name]["value"] is not None]
-        if known and name not in {"contact_time", "restitution"}:
-            quantity = QUANTITIES[name]
-            value = quantity.show(sum(known) / len(known))
-            means.append(f"{quantity.title} {value} {quantity.display_unit}".rstrip())
-    yield f"mean: {', '.join(means)}"
-    methods: dict[str, list[float]] = {}
-    for drop in drops:
-        for method, estimate in drop["restitutions"].items():
-            methods.setdefault(method, []).append(estimate["value"])
-    if methods:
-        texts = (f"by {name} {number(sum(v) / len(v), 3)}" for name, v in methods.items())
-        yield f"mean restitution: {', '.join(texts)}"
-
-
 def _methods(data: dict[str, Any]) -> Iterable[str]:
-    """Yield the means of the drops, and how levels and plate were treated."""
+    """Yield how levels, plate and outliers were treated."""
     drops, low, high = data["drops"], *BACKGROUND
-    yield from _means(drops)
     averaged = "energy average of the drops" if len(drops) > 1 else "of one drop"
     yield (
         f"levels: {averaged}, method exact (band energy of the force from first touch to release, "
@@ -319,14 +273,6 @@ def _methods(data: dict[str, Any]) -> Iterable[str]:
         yield f"levels less than {low:g} dB above the background are upper bounds"
     if met := [check["reason"] for check in data["plate"] if check["met"]]:
         yield f"force plate: {'; '.join(met)}"
-    bands = [f"{entry['band']:g}" for entry in data["criteria"] if entry["band"] is not None]
-    for method, differences in data["method_differences"].items():
-        if any(differences):
-            values = " / ".join("–" if d is None else number(d, 2) for d in differences)
-            yield (
-                f"method {method} differs from exact by up to {values} dB in the octaves of "
-                f"{bands[0]} to {bands[-1]} Hz, in this order"
-            )
     outliers = {note["subject"] for note in data["notes"] if note["code"] == "outlier"}
     if outliers:
         yield (

@@ -40,10 +40,10 @@ def html_to_pdf(page: str) -> bytes:
     return content
 
 
-def pdf_file(page: str, name: str, folder: Path, texts: str) -> dict[str, bytes]:
+def pdf_file(page: str, name: str, folder: Path) -> dict[str, bytes]:
     """Return a page as PDF by the name of its file; empty, with a warning, without WeasyPrint.
 
-    Warn also if no font has some characters of `texts`; `folder` is named in the warnings.
+    Warn also if no font has some of its characters; `folder` is named in the warnings.
     """
     try:
         content = html_to_pdf(page)
@@ -52,7 +52,7 @@ def pdf_file(page: str, name: str, folder: Path, texts: str) -> dict[str, bytes]
         message = f"{folder}: {name} is not written ({cause}); allowed: {NEEDED}"
         warnings.warn(message, ReportWarning, stacklevel=3)
         return {}
-    missing = missing_characters(texts)
+    missing = missing_characters(page)
     if missing:
         message = (
             f"{folder}: no installed font has {missing}, used in {name}; allowed: "

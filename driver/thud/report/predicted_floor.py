@@ -90,6 +90,7 @@ _THICKNESSES = {
     "thickness": "bearing plate",
     "sheathing_thickness": "sheathing",
     "joist_height": "joists",
+    "layer_thickness": "top lamella",
 }
 # Changed key of a floor by the words for its change: its factor, and the plate that it belongs to.
 _FACTORS = {
@@ -391,27 +392,22 @@ def _variants(
     room: Room,
 ) -> Iterator[tuple[str, FloorOptions, Room]]:
     """Yield changes of floor and room in words, with the changed floor and room."""
-    added = f"+{1e3 * _ADDED:g} mm"
     # The mobility or the modes of a known floor do not follow its plate.
     is_computed = not isinstance(floor, ModalFloor | MeasuredMobility)
     for key, title in _THICKNESSES.items():
         if is_computed and (value := getattr(floor, key, 0.0)):
-            yield f"{title} {added}", replace(floor, **{key: value + _ADDED}), room
-    if isinstance(floor, LaminateFloor) and floor.layer_thickness:
-        top, *others = floor.layer_thickness
-        layers = (top + _ADDED, *others)
-        yield f"top lamella {added}", replace(floor, layer_thickness=layers), room
+            # Of the layers of a laminate the top one changes.
+            changed = (
+                (value[0] + _ADDED, *value[1:]) if isinstance(value, tuple) else value + _ADDED
+            )
+            yield f"{title} +{1e3 * _ADDED:g} mm", replace(floor, **{key: changed}), room
     for text, (key, factor, plate) in _FACTORS.items():
         if getattr(floor, plate, 0.0):
             yield text, replace(floor, **{key: factor * getattr(floor, key)}), room
     if room.ceiling_mass:
-        yield (
-            "mass of the ceiling doubled",
-            floor,
-            replace(room, ceiling_mass=2 * room.ceiling_mass),
-        )
-    time = room.reverberation_time
-    times = tuple(2 * value for value in (time if isinstance(time, tuple) else (time,)))
+        heavy = replace(room, ceiling_mass=2 * room.ceiling_mass)
+        yield "mass of the ceiling doubled", floor, heavy
+    times = tuple((2 * np.atleast_1d(room.reverberation_time)).tolist())
     yield "reverberation time doubled", floor, replace(room, reverberation_time=times)
 
 

@@ -11,24 +11,22 @@ from typing import TYPE_CHECKING, Any, Literal
 from thud.base._schema import VERDICTS
 from thud.base.bridge import version
 from thud.base.checks import refuse, require_kind, shown_text
-from thud.base.display import draw_all, warn_if_not_drawn
+from thud.base.display import draw_all
 from thud.base.errors import ReportWarning
 from thud.base.files import Results, read_input
 from thud.base.tables import csv_text, marked
 from thud.recordings.recording import Recording
 from thud.report.contents import FORMAT, json_bytes, report_data
-from thud.report.rows import HEAD, criterion_row
+from thud.report.rows import HEAD, criterion_row, reason_text
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Sequence
 
     from thud.recordings.read_recording import Stages
 
 # Columns of the page that the printed table has.
 _SHOWN = ("Criterion", "Value", "U (95 %)", "Limits", "Margin", "Verdict")
-# Verdicts of several criteria.
-_PLURALS = {VERDICTS[0]: "conform", VERDICTS[1]: "do not conform"}
 LEVELS, CRITERIA, JSON = "levels.csv", "criteria.csv", "report.json"
 HTML, PDF, STAGES = "report.html", "report.pdf", "stages"
 # Names of the figures of the page.
@@ -45,63 +43,45 @@ def table(criteria: Sequence[dict[str, Any]]) -> list[tuple[str, ...]]:
 
 
 def verdict_text(data: dict[str, Any]) -> str:
-    """Return the verdict of a report, marked, as a sentence with a note on own limits."""
+    """Return the verdict of a report, marked, with its reason and a note on own limits."""
     verdict, criteria = data["verdict"], data["criteria"]
     is_undecided = verdict == VERDICTS[2]
     subject, relation = ("The result is", "by") if is_undecided else ("The source", "to")
     limits = f"the limits of the {data['source'].replace('_', ' ')}"
     has_own_limits = any(not criterion["limits_of_standard"] for criterion in criteria)
     note = " Limits marked * are those of the laboratory." if has_own_limits else ""
-    counts = count_verdicts(criterion["verdict"] for criterion in criteria)
-    return f"{subject} {marked(verdict, verdict)} {relation} {limits} at 95 %: {counts}.{note}"
-
-
-def count_verdicts(results: Iterable[str]) -> str:
-    """Return a text with the number of criteria for each verdict.
-
-    >>> count_verdicts(["conforms", "conforms", "does not conform"])
-    '2 criteria conform, 1 does not conform'
-    """
-    listed = list(results)
-    counts = {verdict: listed.count(verdict) for verdict in VERDICTS if verdict in listed}
-    parts: list[str] = []
-    for verdict, count in counts.items():
-        noun = "" if parts else " criterion" if count == 1 else " criteria"
-        parts.append(f"{count}{noun} {verdict if count == 1 else _PLURALS.get(verdict, verdict)}")
-    return ", ".join(parts)
+    result = f"{subject} {marked(verdict, verdict)} {relation} {limits} at 95 %"
+    return f"{result}: {reason_text(criteria)}.{note}"
 
 
 def levels_csv(data: dict[str, Any]) -> str:
     """Return the levels of a report in all bands, with uncertainties and background, as CSV."""
-    head = (
-        "bandwidth nominal_Hz level_dB standard_uncertainty_dB expanded_dB background_dB spread_dB "
-        "flag"
-    )
-    keys = ("level", "uncertainty", "expanded_uncertainty", "background", "spread", "flag")
+    columns = {
+        "nominal_Hz": "band",
+        "level_dB": "level",
+        "standard_uncertainty_dB": "uncertainty",
+        "expanded_dB": "expanded_uncertainty",
+        "background_dB": "background",
+        "spread_dB": "spread",
+        "flag": "flag",
+    }
     rows = [
-        [bands, f"{nominal:g}", *(levels[key][i] for key in keys)]
+        (bands, *row)
         for bands, levels in data["levels"].items()
-        for i, nominal in enumerate(levels["band"])
+        for row in zip(*(levels[key] for key in columns.values()), strict=True)
     ]
-    return csv_text([head.split(), *rows])
+    return csv_text([("bandwidth", *columns), *rows])
 
 
 def criteria_csv(data: dict[str, Any]) -> str:
     """Return value, uncertainty, limits and verdict of each criterion of a report as CSV."""
-    keys = ("expanded_uncertainty", "lower", "upper", "margin", "verdict")
-    rows = [
-        [
-            criterion["name"],
-            criterion["unit"],
-            criterion["value"],
-            str(criterion["upper_bound"]).lower(),
-            *(criterion[key] for key in keys),
-        ]
-        for criterion in data["criteria"]
-    ]
-    head = "criterion unit value upper_bound uncertainty lower upper margin verdict"
-    comment = f"# thud {version()}; SI units, levels in dB re 1 N, 1 s; uncertainty: U (95 %)\n"
-    return comment + csv_text([head.split(), *rows])
+    keys = (
+        "name", "unit", "value", "upper_bound", "expanded_uncertainty", "lower", "upper", "margin",
+        "verdict",
+    )  # fmt: skip
+    rows = [[criterion[key] for key in keys] for criterion in data["criteria"]]
+    comment = f"# thud {version()}; SI units, levels in dB re 1 N, 1 s; uncertainties for 95 %\n"
+    return comment + csv_text([keys, *rows])
 
 
 def file_names(*, figures: bool = True, stages: bool = False) -> list[str]:
@@ -164,10 +144,10 @@ def save(
         CRITERIA: criteria_csv(data).encode(),
         JSON: json_bytes(data),
     }
-    if figures and _has_matplotlib():
+    if figures:
         drawings = draw_figures(recording)
         contents |= page_contents(recording, data, drawings, folder) | drawings
-    if stages and _has_matplotlib():
+    if stages:
         from thud.plot.save_figures import figure_files
 
         contents |= figure_files({STAGES: stages.plot()})
@@ -195,12 +175,12 @@ def page_contents(
     `drawings` are the figures as SVG. Warn if there is no PDF, or no font for some characters;
     `folder` is named in the warning.
     """
-    from thud.report.page import laboratory_text, report_page
+    from thud.report.page import report_page
     from thud.report.pdf import pdf_file
 
     mark = recording.config.report.accreditation_mark
     page = report_page(data, drawings.values(), read_picture(Path(mark)) if mark else None)
-    return {HTML: page.encode(), **pdf_file(page, PDF, folder, laboratory_text(data))}
+    return {HTML: page.encode(), **pdf_file(page, PDF, folder)}
 
 
 def read_picture(path: Path) -> tuple[str, bytes]:
@@ -216,14 +196,6 @@ def read_picture(path: Path) -> tuple[str, bytes]:
     if not kind or not content:
         refuse(f"{problem} ({'too large or empty' if kind else 'no picture'})", allowed)
     return kind, content
-
-
-def _has_matplotlib() -> bool:
-    with warn_if_not_drawn("the page"):
-        import matplotlib as mpl
-
-        return bool(mpl.__version__)
-    return False
 
 
 def _checksums(data: dict[str, Any]) -> list[str]:

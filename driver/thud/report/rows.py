@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from thud.base._schema import VERDICTS
 from thud.base.tables import Result
 from thud.level.assessment import criterion_quantity
 from thud.level.estimate import NORMAL_FACTOR
@@ -123,6 +124,19 @@ def risk_text(probability: float | None) -> str:
     if percent >= 99.95:  # noqa: PLR2004
         return "> 99.9 %"
     return "< 0.01 %" if percent < 0.01 else f"{percent:.{2 if percent < 1 else 1}f} %"  # noqa: PLR2004
+
+
+def reason_text(criteria: Sequence[dict[str, Any]]) -> str:
+    """Return the criteria that are undecided or not met, and whether U is incomplete."""
+    parts = []
+    for verdict in VERDICTS[1:]:
+        matching = [criterion for criterion in criteria if criterion["verdict"] == verdict]
+        if names := [quantity_of(criterion).title for criterion in matching]:
+            parts.append(f"{verdict}: {', '.join(names)}")
+    parts = parts or ["all criteria are met"]
+    if any(criterion["excluded"] for criterion in criteria):
+        parts.append(f"U is incomplete where it is marked {INCOMPLETE}")
+    return "; ".join(parts)
 
 
 def excluded_text(criteria: Sequence[dict[str, Any]], name: str = "U") -> str:
