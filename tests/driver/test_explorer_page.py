@@ -417,17 +417,6 @@ def test_link_copied_twice_keeps_the_name_of_its_button(browser: Browser, server
     sync_api.expect(page.locator("#link")).to_have_text("Copy link")
 
 
-def test_each_tab_has_its_own_units(browser: Browser, server: Served) -> None:
-    page = new_page(browser, server[0])
-    other = page.context.new_page()
-    other.goto(server[0])
-    other.locator("#preset_standard_ball").wait_for()
-    share(other, "#units")
-    sync_api.expect(field(other, "ball.wall_thickness")).to_have_value("0.032")
-    fill(page, "ball.wall_thickness", "200")
-    sync_api.expect(page.locator("#message")).to_contain_text("200 mm")
-
-
 @pytest.mark.parametrize("width", [1400, 400])
 def test_focus_moves_no_field(browser: Browser, server: Served, width: int) -> None:
     page = new_page(browser, server[0], width)
@@ -526,42 +515,6 @@ def test_slider_keys_reach_the_ends(browser: Browser, server: Served) -> None:
     settle(page)
     sync_api.expect(field(page, "drop.height")).to_have_value("3")
     sync_api.expect(page.locator("#criteria tbody tr").first).to_contain_text("high")
-
-
-def test_fields_change_to_si_units(browser: Browser, server: Served) -> None:
-    page = new_page(browser, server[0])
-    wall, label = field(page, "ball.wall_thickness"), page.locator("[for='ball.wall_thickness']")
-    sync_api.expect(label).to_have_text("Wall thickness, mm")
-    page.locator("#keep").click()
-    share(page, "#units")
-    settle(page)
-    sync_api.expect(label).to_have_text("Wall thickness, m")
-    sync_api.expect(wall).to_have_value("0.032")
-    sync_api.expect(field(page, "ball.youngs_modulus")).to_have_value("1560000")
-    # Steps, help, names and errors have the same units.
-    wall.focus()
-    page.keyboard.press("ArrowDown")
-    sync_api.expect(wall).to_have_value("0.031")
-    sync_api.expect(field(page, "ball.outer_radius.help")).to_contain_text("allowed: 0 to 10 m")
-    settle(page)
-    assert names_of(page) == ["Wall 0.031 m", "Wall 0.032 m"]
-    fill(page, "ball.wall_thickness", "0.2")
-    message = "Wall thickness = 0.2 m is not allowed; allowed: more than 0 m and less than outer"
-    sync_api.expect(page.locator("#message")).to_contain_text(message)
-    fill(page, "ball.wall_thickness", "0.03")
-    settle(page)
-    # The browser and the link remember them.
-    share(page, "#link")
-    address = page.evaluate("navigator.clipboard.readText()")
-    page.wait_for_timeout(600)
-    page.reload()
-    sync_api.expect(wall).to_have_value("0.03")
-    share(page, "#units")
-    sync_api.expect(wall).to_have_value("30")
-    page.goto("about:blank")
-    page.goto(address)
-    sync_api.expect(wall).to_have_value("0.03")
-    sync_api.expect(page.locator("#units")).to_have_text("Fields in mm, MPa")
 
 
 # ---- Comparison, history, storage and link.
@@ -1179,9 +1132,6 @@ def test_page_works_without_storage(browser: Browser, server: Served, fault: str
     fill(page, "drop.height", "0.9")
     settle(page)
     assert height_of(page) == "0.9"
-    share(page, "#units")
-    settle(page)
-    sync_api.expect(field(page, "ball.wall_thickness")).to_have_value("0.032")
     page.locator("#undo").click()
     sync_api.expect(field(page, "drop.height")).to_have_value("1")
     # The address keeps the token that cannot be stored.

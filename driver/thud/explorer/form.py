@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from contextvars import ContextVar
 from dataclasses import fields
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -34,15 +33,13 @@ STEPS_OF_UNITS = {
     "m": 0.1, "m3": 1.0, "dB": 1.0, "kg/m2": 1.0, "s": 0.001, "s/m": 0.01, "Pa": 1000.0,
     "Hz": 100.0,
 }  # fmt: skip
-# Whether the fields of the current request have SI units instead of display units, such as mm.
-SI_UNITS = ContextVar("SI_UNITS", default=False)
 _SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 # Groups of keys that are not on the page.
 OMITTED_GROUPS = ("case", "modes", "compression", "output")
 
 
 def form() -> list[dict[str, Any]]:
-    """Return the groups of fields, in the units of the current request.
+    """Return the groups of fields.
 
     A group has part (``"model"``, ``"floor"``, ``"room"`` or its name), name, title and fields. A
     field has group and name of its key, label, kind, help, choices, default, the models that use it
@@ -61,13 +58,9 @@ def form() -> list[dict[str, Any]]:
     return [*groups, *models, *floors, room]
 
 
+@lru_cache(maxsize=1)
 def fields_by_key() -> dict[tuple[str, str], dict[str, Any]]:
-    """Return the fields of the page by group and key, in the units of the current request."""
-    return _fields_by_key(has_si_units=SI_UNITS.get())
-
-
-@lru_cache(maxsize=2)
-def _fields_by_key(*, has_si_units: bool) -> dict[tuple[str, str], dict[str, Any]]:  # noqa: ARG001 - tells results apart
+    """Return the fields of the page by group and key."""
     return {(field["group"], field["name"]): field for group in form() for field in group["fields"]}
 
 
@@ -200,7 +193,7 @@ def _limit(limit: float | str, power: int) -> str:
 def _unit(key: Key, default: float) -> str:
     """Return the unit of the field of a key."""
     # Times remain in seconds: a reverberation time of 500 ms would be unusual.
-    if key.unit == "s" or SI_UNITS.get():
+    if key.unit == "s":
         return key.unit
     # Lengths that may be 0 have the unit of their maximum.
     size = (

@@ -19,7 +19,6 @@ from thud.base.bridge import progress
 from thud.base.errors import ThudError
 from thud.explorer.answer import answer_case, answer_quickly, new_case
 from thud.explorer.downloads import DOWNLOADS
-from thud.explorer.form import SI_UNITS
 from thud.explorer.improve import fit_recording, improve
 from thud.explorer.messages import describe_error
 from thud.explorer.press import fit_press
@@ -100,7 +99,7 @@ class Jobs:
                         with child_end:
                             await anyio.to_thread.run_sync(process.start)
                     end = anyio.current_time() + self._time_limit
-                    request = (folder, task, arguments, SI_UNITS.get())
+                    request = (folder, task, arguments)
                     report = await self._call(end, _exchange, connection, request)
                     while "done" in report:
                         yield report
@@ -168,8 +167,7 @@ def _run_tasks(connection: Connection) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (MAX_MEMORY, MAX_MEMORY))
     with suppress(EOFError, OSError):
         while True:
-            tempfile.tempdir, task, arguments, has_si_units = connection.recv()
-            SI_UNITS.set(has_si_units)
+            tempfile.tempdir, task, arguments = connection.recv()
             connection.send(_run_task(connection, task, arguments))
 
 

@@ -32,7 +32,7 @@ from thud.case.case import read_case
 from thud.case.keys import humanize
 from thud.explorer.criteria import glossary
 from thud.explorer.downloads import DOWNLOADS
-from thud.explorer.form import SI_UNITS, construction_form, form
+from thud.explorer.form import construction_form, form
 from thud.explorer.jobs import INPUT_ERRORS, Jobs
 from thud.explorer.messages import describe_error
 from thud.explorer.models import floor_facts, model_facts
@@ -69,8 +69,6 @@ IDLE_TIME = 10
 TOKEN = "x-thud-token"  # noqa: S105 - its name
 # Header of a downloaded sound with its full scale, Pa.
 FULL_SCALE = "x-thud-full-scale"
-# Header that is "SI" if fields and messages are to have SI units.
-UNITS = "x-thud-units"
 # Maximum pause between two chunks of a body, s, and its maximum duration: a time, s, plus that of
 # its bytes at a rate, 1/s.
 BODY_TIMEOUT = 20.0
@@ -142,6 +140,7 @@ def new_application(
         lifespan=lifespan,
     )
     application.state.about = {
+        "form": form(),
         "constructions": construction_form(),
         "recording": list(map(asdict, FIELDS)),
         "press": list(map(asdict, PRESS_FIELDS)),
@@ -180,7 +179,7 @@ async def _page(request: Request) -> Response:
 
 
 async def _about(request: Request) -> Response:
-    return JSONResponse({**request.app.state.about, "form": form()}, headers=HEADERS)
+    return JSONResponse(request.app.state.about, headers=HEADERS)
 
 
 async def _solve(request: Request) -> Response:
@@ -323,7 +322,6 @@ def _guarded(endpoint: Endpoint) -> Endpoint:
         if not secrets.compare_digest(token, request.app.state.token.encode()):
             message = "open the full address shown in the terminal: it holds the token"
             raise HTTPException(403, message)
-        SI_UNITS.set(request.headers.get(UNITS) == "SI")
         return await endpoint(request)
 
     return answer

@@ -1,6 +1,6 @@
 // Requests and answers of the doors: which answers are current, messages, and the tasks of the server.
 import { byId, button, element } from "./page.js";
-import { ConnectionError, ServerError, ask, follow, units } from "./request.js";
+import { ConnectionError, ServerError, ask, follow } from "./request.js";
 import { about, caseValues, invalidField, isTyping, markField, state } from "./form.js";
 import { isLaboratory, recording, recordingBody, recordingRequest, statedRows } from "./recording.js";
 
@@ -41,7 +41,7 @@ function idOf(file) {
 export const subjectOf = (door) => JSON.stringify(door === "recording" ? recording.files.map(idOf) : caseValues(door));
 
 /** Return the text of the request of a door with its present values and files. */
-export const requestOf = (door) => JSON.stringify([subjectOf(door), door === "recording" ? recordingRequest().values : units.get()]);
+export const requestOf = (door) => JSON.stringify([subjectOf(door), door === "recording" && recordingRequest().values]);
 
 /** Return whether the answer of a door, if it needs one, is that to its present values and files. */
 export function isCurrent(door) {

@@ -1,6 +1,6 @@
 // Start of the page: its menu, links, keys and files, and the case with which it begins.
 import { byId, button, element, saveFile } from "./page.js";
-import { ConnectionError, ask, firstAbout, fragment, requestAbout, setFragment, takeFragment, units } from "./request.js";
+import { ConnectionError, ask, firstAbout, fragment, setFragment, takeFragment } from "./request.js";
 import { hideTip, showPlots } from "./results.js";
 import { firstVariant } from "./first.js";
 import { listenToBall } from "./ball.js";
@@ -15,7 +15,7 @@ import { DOORS, formHandlers, keep, move, openDoor, showAll, variantsOfDoor } fr
 async function copyLink() {
   if (hasInvalidField()) return;
   const variants = kept.list.filter(({ values }) => values).map(({ door, values, title, chosen }) => ({ door, values, title, chosen }));
-  const content = { door: state.door, ball: caseValues("ball"), floor: caseValues("floor"), variants, units: units.get(), view: state.view };
+  const content = { door: state.door, ball: caseValues("ball"), floor: caseValues("floor"), variants, view: state.view };
   const address = `${location.origin}/#case=${encodeURIComponent(JSON.stringify(content))}`;
   const isCopied = await copyText(address, "Copy this link");
   if (isCopied) flash("link", "Link copied");
@@ -42,14 +42,13 @@ function flash(id, text) {
 const takeLink = once(async (text) => {
   let content = null;
   try { content = JSON.parse(text); } catch { /* Not a link of this page. */ }
-  const { door, ball, floor, variants, units: name, view } = content ?? {};
+  const { door, ball, floor, variants, view } = content ?? {};
   const isVariant = (variant) => ["ball", "floor"].includes(variant?.door) && isCase(variant.values) && [variant.title, variant.chosen].every((text) => ["string", "undefined"].includes(typeof text));
   if (!DOORS.includes(door) || ![ball, floor].every(isCase) || !Array.isArray(variants) || !variants.every(isVariant)) {
     showMessage("The link does not contain a case; allowed: links copied from this page");
     return;
   }
   commit();
-  await setUnits(name);
   const taken = [];
   for (const variant of variants) {
     const answer = await runTask("Computing", "solve", JSON.stringify(variant.values), new AbortController());
@@ -71,24 +70,6 @@ async function onAddress() {
   if (parameters.has("case")) await takeLink(parameters.get("case"));
   else if (door) openDoor(door);
   else reconnect();
-}
-
-/** Take over the units of the fields, "SI" or empty; the server describes the fields in them. */
-async function setUnits(name) {
-  units.set(name === "SI" ? name : "");
-  Object.assign(about, await requestAbout());
-  nameUnits();
-}
-
-function nameUnits() {
-  byId("units").textContent = units.get() ? "Fields in mm, MPa" : "Fields in SI units";
-}
-
-async function switchUnits() {
-  try {
-    await setUnits(units.get() ? "" : "SI");
-    openDoor(state.door);
-  } catch (error) { showError(error); }
 }
 
 function reset() {
@@ -151,7 +132,6 @@ function listen() {
   byId("keep").addEventListener("click", keep);
   byId("undo").addEventListener("click", () => move(-1));
   byId("redo").addEventListener("click", () => move(1));
-  byId("units").addEventListener("click", switchUnits);
   byId("reset").addEventListener("click", reset);
   byId("link").addEventListener("click", copyLink);
   byId("save_page").addEventListener("click", savePage);
@@ -210,7 +190,6 @@ async function main() {
     return;
   }
   byId("tools").hidden = false;
-  nameUnits();
   addPlotMenus();
   listen();
   holdForClicks();

@@ -38,14 +38,6 @@ export function setFragment(text) {
 /** Parameters with which the page was opened. */
 export const fragment = takeFragment();
 
-let ownUnits = stored("units") ?? "";
-
-/** Units of the fields: "SI", or empty for mm, MPa and so on; stored for the next page, as other open pages keep theirs. */
-export const units = {
-  get: () => ownUnits,
-  set: (name) => { ownUnits = name; storeText("units", name); },
-};
-
 /** Return the response; throw ServerError, ConnectionError or, if the request was cancelled, AbortError. */
 export async function ask(path, options = {}) {
   // Another page in this browser may have stored the token of a new server.
@@ -53,7 +45,7 @@ export async function ask(path, options = {}) {
   if (!token) throw new ConnectionError(MISSING_TOKEN);
   let response = null;
   try {
-    response = await fetch(path, { ...options, headers: { "X-Thud-Token": token, "X-Thud-Units": units.get() } });
+    response = await fetch(path, { ...options, headers: { "X-Thud-Token": token } });
   } catch (error) {
     if (error.name === "AbortError") throw error;
     throw new ConnectionError(`The server does not answer; ${restart()}`);
@@ -87,8 +79,6 @@ export async function follow(path, body, signal, onProgress) {
   }
 }
 
-/** Return what the server says of itself. */
-export const requestAbout = () => ask("about").then((response) => response.json());
-/** The same, requested before the rest of the page has arrived. */
-export const firstAbout = requestAbout();
+/** What the server says of itself, requested before the rest of the page has arrived. */
+export const firstAbout = ask("about").then((response) => response.json());
 firstAbout.catch(() => {});
