@@ -1,72 +1,71 @@
-"""The page as one file with scripts, style and first answer, so that one request shows it."""
+"""The page, with its style, the modules of its first picture and the answer that this shows.
+
+One request shows them; the other modules follow as files.
+"""
 
 from __future__ import annotations
 
-import base64
-import hashlib
-import json
-import re
-from dataclasses import dataclass
+import secrets
+from functools import cache
 from importlib import resources
 from typing import TYPE_CHECKING, Any
+from urllib.parse import quote
+
+from jinja2 import Environment, PackageLoader
 
 from thud.explorer.answer import answer_case, new_case
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
-    from importlib.resources.abc import Traversable
 
 FOLDER = resources.files("thud.explorer") / "page"
-_STYLE = re.compile(r'<link rel="stylesheet" href="page/([\w.]+)">')
-_SCRIPT = re.compile(r'<script type="module" src="page/([\w.]+)"></script>')
-_FIRST = '<script type="application/json" id="first_answer">'
-# Comments of whole lines, indents and empty lines, blanks of a style, and imports of other modules:
-# a script shares the names of those before.
-_COMMENT = re.compile(r"^[ \t]*(?://[^\n]*|/\*.*?\*/)\n", re.MULTILINE | re.DOTALL)
-_INDENT = re.compile(r"^[ \n]+", re.MULTILINE)
-_BLANK = re.compile(r"(?<=[{};,:]) | (?=[{}])")
-_IMPORT = re.compile(r'^import .*"\./[\w.]+";\n', re.MULTILINE)
-_EXPORT = re.compile(r"^export ", re.MULTILINE)
-# The page loads nothing, but plays and shows what it has made or downloaded with its token.
+# Modules of the first picture.
+FIRST = ("page", "storage", "request", "plot", "results", "first")
+# What an address of data may contain as it is.
+_SAFE = "".join(character for character in map(chr, range(32, 127)) if character not in "%#")
+# The page loads its own modules, and plays and shows what it has made or downloaded with its token.
 _POLICY = (
     "default-src 'none'; connect-src 'self'; img-src data: blob:; media-src blob:; "
-    "script-src {scripts}; style-src {styles}; frame-ancestors 'none'; base-uri 'none'; "
-    "form-action 'none'"
+    "script-src 'self' 'nonce-{nonce}'; style-src 'nonce-{nonce}'; frame-ancestors 'none'; "
+    "base-uri 'none'; form-action 'none'"
 )
+_TEMPLATES = Environment(loader=PackageLoader("thud.explorer", "page"), autoescape=True)
 
 
-@dataclass(frozen=True)
-class Page:
-    """Content of the page, its content security policy and its entity tag."""
-
-    content: str
-    policy: str
-    tag: str
+def first_answer(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the values of a case and its answer; the motion comes with the next answer."""
+    return {"values": values, "answer": answer_case(new_case(values)) | {"motion": None}}
 
 
-def new_page(values: Mapping[str, Any] | None) -> Page:
-    """Return the page, with the answer of the values of a case unless they are None."""
-    hashes: dict[str, list[str]] = {"scripts": [], "styles": []}
+def render_page(first: Mapping[str, Any] | None, address: str) -> tuple[str, str]:
+    """Return the page and its content security policy.
 
-    def inline(match: re.Match[str], kind: str, element: str) -> str:
-        text = _text(FOLDER / match[1], is_script=kind == "scripts")
-        digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
-        hashes[kind].append(f"'sha256-{digest}'")
-        return f"<{element}>{text}</{element}>"
+    Parameters
+    ----------
+    first
+        Answer that it shows first, see `first_answer`; None: it has to ask.
+    address
+        Address of the server, which ends with a slash.
+    """
+    nonce = secrets.token_urlsafe(16)
+    page = _TEMPLATES.get_template("index.html")
+    others = sorted(
+        file.name
+        for file in FOLDER.iterdir()
+        if file.name.endswith(".js") and file.name.removesuffix(".js") not in FIRST
+    )
+    content = page.render(first=first, imports=_import_map(address), others=others, nonce=nonce)
+    return content, _POLICY.format(nonce=nonce)
 
-    content = (FOLDER / "index.html").read_text(encoding="utf-8")
-    content = _STYLE.sub(lambda match: inline(match, "styles", "style"), content)
-    content = _SCRIPT.sub(lambda match: inline(match, "scripts", "script"), content)
-    if values is not None:
-        # The motion comes with the next answer.
-        first = {"values": values, "answer": answer_case(new_case(values)) | {"motion": None}}
-        text = json.dumps(first, allow_nan=False, separators=(",", ":")).replace("</", "<\\/")
-        content = content.replace(_FIRST, _FIRST + text)
-    policy = _POLICY.format(**{kind: " ".join(found) or "'none'" for kind, found in hashes.items()})
-    return Page(content, policy, f'"{hashlib.sha256(content.encode()).hexdigest()}"')
 
-
-def _text(file: Traversable, *, is_script: bool) -> str:
-    """Return a style, or a module as a script, without comments and needless blanks."""
-    text = _INDENT.sub("", _COMMENT.sub("", file.read_text(encoding="utf-8")))
-    return _EXPORT.sub("", _IMPORT.sub("", text)) if is_script else _BLANK.sub("", text)
+@cache
+def _import_map(address: str) -> dict[str, dict[str, str]]:
+    """Return the import map that has the modules of the first picture as data."""
+    texts = {name: (FOLDER / f"{name}.js").read_text(encoding="utf-8") for name in FIRST}
+    # An address of data has no folder in which its imports could be looked for.
+    imports = {
+        f"{address}page/{name}.js": "data:text/javascript,"
+        + quote(text.replace('from "./', f'from "{address}page/'), safe=_SAFE)
+        for name, text in texts.items()
+    }
+    return {"imports": imports}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import secrets
 import shutil
 import socket
@@ -10,20 +11,20 @@ from contextlib import AsyncExitStack, aclosing, asynccontextmanager
 from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 import anyio
 import uvicorn
 from starlette.applications import Starlette
-from starlette.datastructures import FormData, UploadFile
+from starlette.datastructures import MutableHeaders
 from starlette.exceptions import HTTPException
-from starlette.formparsers import MultiPartException, MultiPartParser
 from starlette.middleware import Middleware
 from starlette.middleware.gzip import GZipMiddleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import ClientDisconnect
-from starlette.responses import JSONResponse, Response, StreamingResponse
-from starlette.routing import Route
+from starlette.responses import HTMLResponse, JSONResponse, Response, StreamingResponse
+from starlette.routing import Mount, Route
+from starlette.staticfiles import StaticFiles
 
 from thud.base._schema import KEYS
 from thud.base.bridge import version
@@ -36,43 +37,39 @@ from thud.explorer.form import construction_form, form
 from thud.explorer.jobs import INPUT_ERRORS, Jobs
 from thud.explorer.messages import describe_error
 from thud.explorer.models import floor_facts, model_facts
-from thud.explorer.page_file import new_page
+from thud.explorer.page_file import first_answer, render_page
 from thud.explorer.presets import presets
 from thud.explorer.recording_fields import FIELDS, PRESS_FIELDS, recording_table
 
 if TYPE_CHECKING:
-    from collections.abc import AsyncGenerator, Awaitable, Callable, Iterator, Mapping, Sequence
+    from collections.abc import AsyncGenerator, Awaitable, Callable, Mapping, Sequence
 
+    from starlette.datastructures import UploadFile
     from starlette.requests import Request
-    from starlette.types import Receive, Scope, Send
+    from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
     Endpoint = Callable[[Request], Awaitable[Response]]
+    Reports = AsyncGenerator[dict[str, Any], None]
 
 # Maximum size of a case and of the files of a recording, bytes.
 MAX_CASE = 100_000
 MAX_RECORDING = 200_000_000
-# Keys that name files, by group: all texts but the name of the case and the lists of unknowns.
-FILE_KEYS = {
-    key.group: [other.name for other in KEYS if other.group == key.group and other.kind == "text"]
-    for key in KEYS
-    if key.kind == "text" and key.group != "case"
-}
+# Group and name of the keys that name files: all texts but the name of the case.
+FILE_KEYS = [(key.group, key.name) for key in KEYS if key.kind == "text" and key.group != "case"]
 # Maximum length of the name of a copy of a file, of up to four bytes a character.
 MAX_NAME = 50
 # Maximum number of files and of fields in a form.
 MAX_FILES = 100
 MAX_FIELDS = 100
-# Maximum number of requests at a time, and time that an idle connection stays open, s.
+# Maximum number of requests at a time, time that an idle connection stays open, s, and maximum size
+# of the head of a request, bytes.
 MAX_REQUESTS = 500
 IDLE_TIME = 10
+MAX_HEAD = 16_384
 # Header that carries the token.
 TOKEN = "x-thud-token"  # noqa: S105 - its name
 # Header of a downloaded sound with its full scale, Pa.
 FULL_SCALE = "x-thud-full-scale"
-# Maximum pause between two chunks of a body, s, and its maximum duration: a time, s, plus that of
-# its bytes at a rate, 1/s.
-BODY_TIMEOUT = 20.0
-BODY_TIME, BODY_RATE = 60.0, 50_000.0
 # Level of compression: higher ones save a few percent and take twice as long.
 COMPRESSION = 6
 # Time limits of a task and of a task that is expected to be quick, s; after that it runs again as a
@@ -83,7 +80,6 @@ HEADERS = {
     "Content-Security-Policy": "default-src 'none'; frame-ancestors 'none'",
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
-    "Cache-Control": "no-store",
 }
 
 
@@ -101,12 +97,11 @@ def new_application(
     hosts
         Host names in requests that the server accepts.
     width
-        Maximum number of concurrent slow tasks, and of copies of recordings; the maximum number of
-        quick tasks is twice as large.
+        Maximum number of concurrent slow tasks; the maximum number of quick tasks is twice as
+        large.
     """
     if not token:
         refuse("the token is empty", "a secret text")
-    slow = Jobs(width, TIME_LIMIT)
     quick = Jobs(2 * width, QUICK_TIME_LIMIT, late={"answer": None}, reuse=True)
 
     @asynccontextmanager
@@ -117,35 +112,39 @@ def new_application(
     application = Starlette(
         routes=[
             Route("/", _page),
+            Mount("/page", StaticFiles(packages=[("thud.explorer", "page")])),
+            Route("/about", _guarded(_about)),
             *(
-                Route(path, _guarded(endpoint), methods=methods)
-                for path, endpoint, methods in (
-                    ("/about", _about, ["GET"]),
-                    ("/solve", _solve, ["POST"]),
-                    ("/measure", _measure, ["POST"]),
-                    ("/report", _report, ["POST"]),
-                    ("/improve", _improve, ["POST"]),
-                    ("/fit", _fit, ["POST"]),
-                    ("/press", _press, ["POST"]),
-                    ("/download/{name}", _download, ["POST"]),
+                Route(path, _guarded(endpoint, limit), methods=["POST"])
+                for path, endpoint, limit in (
+                    ("/solve", _solve, MAX_CASE),
+                    ("/improve", _improve, MAX_CASE),
+                    ("/download/{name}", _download, MAX_CASE),
+                    ("/measure", _with_files("recording", recording_table), MAX_RECORDING),
+                    ("/report", _with_files("report", recording_table), MAX_RECORDING),
+                    ("/fit", _with_files("fit", recording_table, has_case=True), MAX_RECORDING),
+                    ("/press", _with_files("press", dict, has_case=True), MAX_RECORDING),
                 )
             ),
         ],
         middleware=[
+            Middleware(_WithHeaders),
             Middleware(TrustedHostMiddleware, allowed_hosts=list(hosts)),
             Middleware(GZipMiddleware, compresslevel=COMPRESSION),
         ],
-        exception_handlers=dict.fromkeys((*INPUT_ERRORS, HTTPException, _TaskError), _report_error)
-        | {ClientDisconnect: _ignore_error},
+        exception_handlers=dict.fromkeys(
+            (*INPUT_ERRORS, HTTPException, ClientDisconnect), _report_error
+        ),
         lifespan=lifespan,
     )
+    floors = floor_facts()
     application.state.about = {
         "form": form(),
         "constructions": construction_form(),
         "recording": list(map(asdict, FIELDS)),
         "press": list(map(asdict, PRESS_FIELDS)),
         "models": model_facts(),
-        "floors": floor_facts(),
+        "floors": floors,
         "presets": presets(),
         "glossary": glossary(),
         "version": version(),
@@ -153,145 +152,97 @@ def new_application(
         "max_recording": MAX_RECORDING,
     }
     # The page itself is sent without a token, and holds nothing of a user.
-    application.state.page = new_page(None if start else presets()[0]["values"])
-    application.state.offered = {
-        path
-        for values in (start, *(facts["values"] for facts in floor_facts()))
-        for _, keys in _files_in(values)
-        for path in keys.values()
-    }
+    application.state.first = None if start else first_answer(presets()[0]["values"])
+    application.state.offered = [
+        values.get(group, {}).get(name)
+        for values in (start, *(facts["values"] for facts in floors))
+        for group, name in FILE_KEYS
+    ]
     application.state.token = token
-    application.state.slow = slow
+    application.state.slow = Jobs(width, TIME_LIMIT)
     application.state.quick = quick
-    application.state.copies = anyio.Semaphore(width)
     return application
 
 
 async def _page(request: Request) -> Response:
-    page = request.app.state.page
-    headers = {
-        **HEADERS, "Content-Security-Policy": page.policy, "Cache-Control": "no-cache",
-        "ETag": page.tag,
-    }  # fmt: skip
-    if page.tag in request.headers.get("if-none-match", ""):
-        return Response(status_code=304, headers=headers)
-    return Response(page.content, media_type="text/html", headers=headers)
+    content, policy = render_page(request.app.state.first, str(request.base_url))
+    return HTMLResponse(content, headers={"Content-Security-Policy": policy})
 
 
 async def _about(request: Request) -> Response:
-    return JSONResponse(request.app.state.about, headers=HEADERS)
+    return JSONResponse(request.app.state.about)
 
 
 async def _solve(request: Request) -> Response:
-    values = await _values(request)
-    answer = await _answer(request, request.app.state.quick.run("quick case", values))
-    if answer is None:
-        return _Reports(request.app.state.slow.run("case", values), AsyncExitStack())
-    return JSONResponse({"answer": answer}, headers=HEADERS)
-
-
-async def _measure(request: Request) -> Response:
-    return await _with_files(request, "recording", lambda form: (recording_table(form),))
-
-
-async def _report(request: Request) -> Response:
-    return await _with_files(request, "report", lambda form: (recording_table(form),))
+    values, state = _groups(request, await request.body()), request.app.state
+    report = await _last_report(request, state.quick.run("quick case", values))
+    if "error" not in report and report.get("answer") is None:
+        return _Reports(state.slow.run("case", values), AsyncExitStack())
+    return _json(report)
 
 
 async def _improve(request: Request) -> Response:
-    reports = request.app.state.slow.run("improve", await _values(request))
-    return _Reports(reports, AsyncExitStack())
-
-
-async def _fit(request: Request) -> Response:
-    return await _with_files(
-        request, "fit", lambda form: (recording_table(form), _groups(request, form.get("case", "")))
-    )
-
-
-async def _press(request: Request) -> Response:
-    return await _with_files(
-        request, "press", lambda form: (dict(form), _groups(request, form.get("case", "")))
-    )
-
-
-async def _with_files(
-    request: Request, task: str, arguments: Callable[[Mapping[str, str]], tuple[object, ...]]
-) -> Response:
-    """Return reports of a slow task on the files of a form.
-
-    Its arguments are the paths of copies of the files, and the `arguments` of the fields of the
-    form.
-    """
-    state = request.app.state
-    async with AsyncExitStack() as stack:
-        await stack.enter_async_context(state.copies)
-        folder = stack.enter_context(TemporaryDirectory())
-        async with _received(request) as form:
-            fields = {name: value for name, value in form.items() if isinstance(value, str)}
-            further = arguments({name: text for name, text in fields.items() if text})
-            files = [value for value in form.getlist("file") if isinstance(value, UploadFile)]
-            if not files:
-                raise HTTPException(400, "the request contains no file")
-            paths = [
-                str(Path(folder, name)) for name in _names([file.filename or "" for file in files])
-            ]
-            for file, path in zip(files, paths, strict=True):
-                await anyio.to_thread.run_sync(_copy, file.file, path)
-        return _Reports(state.slow.run(task, paths, *further), stack.pop_all())
-
-
-@asynccontextmanager
-async def _received(request: Request) -> AsyncGenerator[FormData, None]:
-    """Yield the form in the body of a request, and close its files."""
-    if not request.headers.get("content-type", "").startswith("multipart/form-data"):
-        raise HTTPException(400, "the request does not contain a form with files")
-    parser = MultiPartParser(
-        request.headers, _body(request, MAX_RECORDING),
-        max_files=MAX_FILES, max_fields=MAX_FIELDS, max_part_size=MAX_CASE,
-    )  # fmt: skip
-    try:
-        form = await parser.parse()
-    except MultiPartException as error:
-        raise HTTPException(400, f"the form cannot be read: {error.message}") from None
-    try:
-        yield form
-    finally:
-        await form.close()
-
-
-def _names(names: Sequence[str]) -> list[str]:
-    """Return names for copies of files: the same, but without folders, short and different.
-
-    >>> _names(["../a b.wav", "a b.wav", ".."])
-    ['a b.wav', '2 a b.wav', 'recording']
-    """
-    result: list[str] = []
-    for number, name in enumerate(names, 1):
-        path = Path("".join(filter(str.isprintable, name)).replace("\\", "/"))
-        ending = "".join(c for c in path.suffix if c.isascii() and c.isalnum())[:8]
-        title = path.stem.strip(". ")[:MAX_NAME] or "recording"
-        title = f"{title}.{ending}" if ending else title
-        result.append(f"{number} {title}" if title in result else title)
-    return result
-
-
-def _copy(source: BinaryIO, path: str) -> None:
-    with Path(path).open("wb") as target:
-        shutil.copyfileobj(source, target)
+    values = _groups(request, await request.body())
+    return _Reports(request.app.state.slow.run("improve", values), AsyncExitStack())
 
 
 async def _download(request: Request) -> Response:
     if (name := request.path_params["name"]) not in DOWNLOADS:
         raise HTTPException(404, "there is no such file")
-    reports = request.app.state.slow.run("download", name, await _values(request))
-    content, full_scale = await _answer(request, reports)
-    headers = HEADERS if full_scale is None else HEADERS | {FULL_SCALE: repr(full_scale)}
+    values = _groups(request, await request.body())
+    report = await _last_report(request, request.app.state.slow.run("download", name, values))
+    if "answer" not in report:
+        return _json(report)
+    content, full_scale = report["answer"]
+    headers = {} if full_scale is None else {FULL_SCALE: repr(full_scale)}
     return Response(content, media_type=DOWNLOADS[name][1], headers=headers)
 
 
-async def _answer(request: Request, reports: AsyncGenerator[dict[str, Any], None]) -> Any:  # noqa: ANN401 - of any task
-    """Return the answer at the end of reports; cancel the task if the page disconnects."""
+def _with_files(
+    task: str, read: Callable[[Mapping[str, str]], object], *, has_case: bool = False
+) -> Endpoint:
+    """Return an endpoint that sends the reports of a slow task on the files of a form.
+
+    The arguments of the task are the paths of copies of the files, what `read` returns of the other
+    fields of the form, and the values of its case if it has one.
+    """
+
+    async def answer(request: Request) -> Response:
+        limits = {"max_files": MAX_FILES, "max_fields": MAX_FIELDS, "max_part_size": MAX_CASE}
+        async with AsyncExitStack() as stack:
+            folder = stack.enter_context(TemporaryDirectory())
+            async with request.form(**limits) as form:
+                files = [value for value in form.getlist("file") if not isinstance(value, str)]
+                fields = {name: text for name, text in form.items() if isinstance(text, str)}
+                case = fields.pop("case", "")
+                arguments = [read({name: text for name, text in fields.items() if text})]
+                if has_case:
+                    arguments.append(_groups(request, case))
+                if not files:
+                    raise HTTPException(400, "the request contains no form with a file")
+                paths = await anyio.to_thread.run_sync(_copy, files, folder)
+            reports = request.app.state.slow.run(task, paths, *arguments)
+            return _Reports(reports, stack.pop_all())
+
+    return answer
+
+
+def _copy(files: Sequence[UploadFile], folder: str) -> list[str]:
+    """Return the paths of copies of files; their names have no folder, are short and differ."""
+    paths: list[str] = []
+    for number, file in enumerate(files, 1):
+        name = "".join(filter(str.isprintable, re.split(r"[/\\]", file.filename or "")[-1]))
+        name = name[-MAX_NAME:].strip(". ") or "recording"
+        path = Path(folder, name)
+        path = path.with_name(f"{number} {name}") if path.exists() else path
+        with path.open("wb") as target:
+            shutil.copyfileobj(file.file, target)
+        paths.append(str(path))
+    return paths
+
+
+async def _last_report(request: Request, reports: Reports) -> dict[str, Any]:
+    """Return the last report of a task; end the task if the page disconnects."""
     report: dict[str, Any] = {}
 
     async def cancel_on_disconnect() -> None:
@@ -304,15 +255,16 @@ async def _answer(request: Request, reports: AsyncGenerator[dict[str, Any], None
         async for report in reports:  # noqa: B007 - the last report is used
             pass
         group.cancel_scope.cancel()
-    if "error" in report:
-        raise _TaskError(report)
-    if "answer" not in report:
-        raise ClientDisconnect
-    return report["answer"]
+    # Nobody reads the answer to a page that has disconnected.
+    return report if report.keys() & {"answer", "error"} else {"error": ""}
 
 
-def _guarded(endpoint: Endpoint) -> Endpoint:
-    """Return an endpoint that rejects requests from other pages or without the token."""
+def _json(report: dict[str, Any]) -> Response:
+    return JSONResponse(report, 400 if "error" in report else 200)
+
+
+def _guarded(endpoint: Endpoint, max_length: int = 0) -> Endpoint:
+    """Return an endpoint that rejects requests of other pages, without the token, or too long."""
 
     async def answer(request: Request) -> Response:
         origin = f"{request.url.scheme}://{request.headers.get('host')}"
@@ -322,76 +274,54 @@ def _guarded(endpoint: Endpoint) -> Endpoint:
         if not secrets.compare_digest(token, request.app.state.token.encode()):
             message = "open the full address shown in the terminal: it holds the token"
             raise HTTPException(403, message)
+        # The server ends a body that is longer than its head states.
+        length = request.headers.get("content-length")
+        if length is None and request.method == "POST":
+            raise HTTPException(411, "the request does not state the length of its data")
+        if int(length or 0) > max_length:
+            message = f"the data are larger than {max_length / 1e6:g} MB; allowed: less"
+            raise HTTPException(413, message)
         return await endpoint(request)
 
     return answer
 
 
 async def _report_error(request: Request, error: Exception) -> Response:  # noqa: ARG001 - an error handler
-    if isinstance(error, _TaskError):
-        return JSONResponse(error.report, 400, headers=HEADERS)
     if isinstance(error, HTTPException):
-        report = {"error": error.detail, "field": None}
-        return JSONResponse(report, error.status_code, headers=HEADERS)
-    return JSONResponse(describe_error(error), 400, headers=HEADERS)
-
-
-async def _ignore_error(request: Request, error: Exception) -> Response:  # noqa: ARG001 - an error handler
-    """Return an empty response, which nobody reads, to a page that has disconnected."""
-    return Response(status_code=400)
-
-
-class _TaskError(Exception):
-    """A task has ended with an error; `report` is its last report."""
-
-    def __init__(self, report: dict[str, Any]) -> None:
-        super().__init__(report["error"])
-        self.report = report
+        return JSONResponse({"error": error.detail, "field": None}, error.status_code)
+    return _json(describe_error(error))
 
 
 class _Reports(StreamingResponse):
     """Response with reports as lines; closes the reports and their resources at its end."""
 
-    def __init__(
-        self, reports: AsyncGenerator[dict[str, Any], None], stack: AsyncExitStack
-    ) -> None:
+    def __init__(self, reports: Reports, stack: AsyncExitStack) -> None:
         stack.push_async_callback(reports.aclose)
         self._stack = stack
         lines = (json.dumps(report, allow_nan=False) + "\n" async for report in reports)
-        super().__init__(lines, media_type="application/x-ndjson", headers=HEADERS)
+        super().__init__(lines, media_type="application/x-ndjson")
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         async with self._stack:
             await super().__call__(scope, receive, send)
 
 
-async def _body(request: Request, max_length: int) -> AsyncGenerator[bytes, None]:
-    """Yield the chunks of a body; raise HTTPException if it is too long, too slow or stops."""
-    length = 0
-    start = anyio.current_time()
-    chunks = request.stream()
-    while True:
-        rest = start + BODY_TIME + length / BODY_RATE - anyio.current_time()
-        try:
-            with anyio.fail_after(min(BODY_TIMEOUT, rest)):
-                chunk = await anext(chunks)
-        except StopAsyncIteration:
-            return
-        except TimeoutError:
-            slow = f"the data arrive too slowly; allowed: {BODY_RATE / 1e3:g} kB/s or more"
-            stop = f"no data received for {BODY_TIMEOUT:g} s; allowed: less"
-            message = slow if rest < BODY_TIMEOUT else stop
-            raise HTTPException(408, message) from None
-        length += len(chunk)
-        if length > max_length:
-            message = f"the data are larger than {max_length / 1e6:g} MB; allowed: less"
-            raise HTTPException(413, message)
-        yield chunk
+class _WithHeaders:
+    """Application whose responses have `HEADERS`, and are kept only with an entity tag."""
 
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
 
-async def _values(request: Request) -> dict[str, dict[str, Any]]:
-    """Return the values in the body of a request, by group and key."""
-    return _groups(request, b"".join([chunk async for chunk in _body(request, MAX_CASE)]))
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        async def send_with_headers(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                headers["Cache-Control"] = "no-cache" if "etag" in headers else "no-store"
+                for name, value in HEADERS.items():
+                    headers.setdefault(name, value)
+            await send(message)
+
+        await self._app(scope, receive, send_with_headers)
 
 
 def _groups(request: Request, content: bytes | str) -> dict[str, dict[str, Any]]:
@@ -405,11 +335,11 @@ def _groups(request: Request, content: bytes | str) -> dict[str, dict[str, Any]]
         values = None
     if not (isinstance(values, dict) and all(map(_is_group, values.values()))):
         raise HTTPException(400, "the request does not contain groups of keys with plain values")
-    for group, keys in _files_in(values):
-        for name, path in keys.items():
-            if not isinstance(path, str) or path not in request.app.state.offered:
-                problem = f"{humanize(name).capitalize()} cannot be chosen on the page"
-                refuse(problem, "a file that it offers", subject=f"{group}.{name}")
+    for group, name in FILE_KEYS:
+        path = values.get(group, {}).get(name)
+        if path and path not in request.app.state.offered:
+            problem = f"{humanize(name).capitalize()} cannot be chosen on the page"
+            refuse(problem, "a file that it offers", subject=f"{group}.{name}")
     return values
 
 
@@ -419,14 +349,6 @@ def _is_group(keys: object) -> bool:
         return False
     lists = (value if isinstance(value, list) else [value] for value in keys.values())
     return not any(isinstance(entry, list | dict) for entries in lists for entry in entries)
-
-
-def _files_in(values: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, str]]]:
-    """Yield groups with the files that they name, by key."""
-    for group, names in FILE_KEYS.items():
-        keys = values.get(group)
-        if isinstance(keys, dict):
-            yield group, {name: keys[name] for name in names if keys.get(name)}
 
 
 def start_with(path: Path | None) -> dict[str, Any]:
@@ -450,6 +372,7 @@ def run_server(application: Starlette, listener: socket.socket) -> None:
         log_level="warning",
         limit_concurrency=MAX_REQUESTS,
         timeout_keep_alive=IDLE_TIME,
+        h11_max_incomplete_event_size=MAX_HEAD,
         timeout_graceful_shutdown=1,
     )
     uvicorn.Server(config).run(sockets=[listener])
