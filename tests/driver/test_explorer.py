@@ -245,9 +245,11 @@ def test_floor_and_room_are_answered(client: TestClient) -> None:
     answer = solved(client, SHELL | {"floor": {"name": "joist_floor"}, "room": {"volume": 30}})
     impact = thud.solve(floor=thud.JoistFloor(), model="hollow_sphere").on_floor
     assert impact is not None
-    assert max(answer["motion"]["floor"]) == pytest.approx(
-        1e3 * impact.floor_displacement.max(), rel=0.01
-    )
+    layers = [(layer["thickness"], layer["spacing"]) for layer in answer["section"]["layers"]]
+    floor = thud.JoistFloor()
+    assert layers == [(floor.sheathing_thickness, 0), (floor.joist_height, floor.spacing)]
+    size = answer["room"]["size"]
+    assert size["length"] * size["width"] * size["height"] == pytest.approx(size["volume"]) == 30
     assert max(answer["floor"]["velocity"]["value"]) == pytest.approx(
         1e3 * impact.floor_velocity.max(), rel=0.05
     )

@@ -24,8 +24,8 @@ from thud.explorer.models import (
     users_of,
 )
 from thud.explorer.presets import presets
+from thud.floors.description import CONTRIBUTIONS
 from thud.impact.compute import compute
-from thud.report.predicted_floor import CONTRIBUTIONS
 
 FIELDS = {(field["group"], field["name"]): field for group in form() for field in group["fields"]}
 # Values of keys that all models have, other than the defaults and allowed for all of them.
@@ -196,7 +196,9 @@ def test_headline_of_a_room_is_the_level_with_its_range() -> None:
     room = answer["room"]
     headline = answer["headline"]
     assert f"{headline['words']}{headline['why']}{headline['also']}" == str(prediction.rating)
-    assert all(f"{level:.1f} dB at" in room["ratings"] for level in prediction.octave_level)
+    assert [level for _, level in room["octaves"]] == prediction.octave_level.tolist()
+    ratings = [[rating.level, rating.uncertainty] for rating in prediction.ratings.values()]
+    assert [numbers for _, *numbers in room["ratings"]] == ratings
     assert room["contributions"] == [
         [CONTRIBUTIONS[name].title, pytest.approx(-value), pytest.approx(value)]
         for name, value in prediction.rating.contributions.items()

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base._schema import QUANTITIES, RATED_BANDS, SAMPLE_QUANTITIES, FiniteElement
+from thud.base._schema import QUANTITIES, SAMPLE_QUANTITIES, FiniteElement
 from thud.base.checks import refuse
 from thud.case.case import Case
 from thud.case.keys import humanize
@@ -16,19 +16,16 @@ from thud.explorer.criteria import (
     RESULTS,
     criterion_facts,
     model_headline,
-    room_headline,
 )
+from thud.explorer.floor import floor_answer, room_answer, room_headline, section
 from thud.explorer.messages import in_words
 from thud.explorer.models import MODEL_FACTS
 from thud.explorer.motion import motion_of
 from thud.explorer.series import curve, to_json
-from thud.floors.prediction import predict_level, rating_title
+from thud.floors.prediction import predict_level
 from thud.impact.compute import compute
+from thud.impact.contact_time import contact_force
 from thud.level.levels import BANDWIDTHS, get_bands
-from thud.level.rating import class_text
-from thud.plot.impact_figures import contact_force
-from thud.plot.style import FORCE_NAMES
-from thud.report.predicted_floor import CONTRIBUTIONS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -36,9 +33,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.base._schema import LimitsSource
-    from thud.floors.prediction import RoomPrediction
-    from thud.impact.floor_impact import FloorImpact
-    from thud.impact.impact import Impact
     from thud.level.assessment import Criterion, Verdict
     from thud.recordings.recording import ImpactResult
 
@@ -108,7 +102,7 @@ def answer_case(case: Case) -> Answer:
     force = case.levels.force
     assessed = impact.assess()
     answer = common_answer(impact, assessed, *contact_force(impact, force))
-    answer["force"]["title"] = FORCE_NAMES[force]
+    answer["force"]["kind"] = force
     notes = list(impact.notes)
     error = float(impact.level_error.max())
     # A warning states that the error is unknown.
@@ -116,11 +110,12 @@ def answer_case(case: Case) -> Answer:
         answer["numbers"].append(["numerical error of an octave up to", error, "dB"])
     answer["headline"] = model_headline(assessed)
     on_floor = impact.on_floor
-    answer["motion"] = motion_of(on_floor or impact)
-    answer["floor"] = None if on_floor is None else _floor(impact, on_floor)
+    answer["motion"] = motion_of(impact) if case.floor is None else None
+    answer["section"] = section(case)
+    answer["floor"] = None if on_floor is None else floor_answer(impact, on_floor)
     if case.room is not None and case.floor is not None:
         prediction = predict_level(impact)
-        answer["room"] = _room(prediction) | {"source": answer["headline"]}
+        answer["room"] = room_answer(prediction) | {"source": answer["headline"]}
         answer["headline"] = room_headline(prediction)
         # Both name a source that does not conform.
         known = {note.code for note in notes}
@@ -187,54 +182,3 @@ def _criterion(criterion: Criterion, source: LimitsSource) -> Answer:
         "result": RESULTS[criterion.conforms],
         **criterion_facts(criterion.name, source),
     }
-
-
-def _floor(impact: Impact, on_floor: FloorImpact) -> Answer:
-    """Return force and velocity of a mobile floor, its quantities, and a table of octaves."""
-    shown = np.flatnonzero(on_floor.time <= on_floor.touch_time + 2 * on_floor.contact_time)
-    times = 1e3 * (on_floor.time - on_floor.touch_time)
-    contact = contact_force(on_floor, "floor")
-    header, *rows = on_floor.rows()
-    return {
-        "name": humanize(on_floor.floor.name),
-        "force": curve(contact[0], 1e3 * contact[1]),
-        "velocity": curve(times[shown], 1e3 * on_floor.floor_velocity[shown]),
-        "numbers": [
-            [
-                "peak force relative to rigid floor",
-                20 * np.log10(on_floor.peak_force / impact.peak_force),
-                "dB",
-            ],
-            ["restitution", on_floor.restitution, ""],
-            ["maximum displacement", 1e3 * on_floor.floor_displacement.max(), "mm"],
-            ["energy into the floor", on_floor.floor_work, "J"],
-        ],
-        "header": header,
-        "rows": rows,
-    }
-
-
-def _room(prediction: RoomPrediction) -> Answer:
-    """Return the levels in the room below, dB, with the uncertainty of the rating."""
-    return {
-        "frequency": to_json(prediction.frequency),
-        "level": to_json(prediction.level),
-        "uncertainty": to_json(prediction.uncertainty),
-        "contributions": [
-            [CONTRIBUTIONS[name].title, -value, value]
-            for name, value in prediction.rating.contributions.items()
-        ],
-        "ratings": _ratings_text(prediction),
-    }
-
-
-def _ratings_text(prediction: RoomPrediction) -> str:
-    """Return the ratings, the class, and the levels of octaves."""
-    octaves = zip(RATED_BANDS["octave"], prediction.octave_level, strict=True)
-    levels = ", ".join(f"{level:.1f} dB at {frequency:g} Hz" for frequency, level in octaves)
-    ratings = [
-        f"{rating_title(prediction, name)} {entry}" for name, entry in prediction.ratings.items()
-    ]
-    return "; ".join(
-        filter(None, [*ratings, class_text(prediction.korean_class), f"octaves {levels}"])
-    )

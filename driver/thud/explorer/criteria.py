@@ -6,16 +6,12 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from thud.base._schema import VERDICTS
-from thud.floors.prediction import rating_title, source_note
-from thud.level.rating import class_text
 from thud.report.page import STANDARDS
-from thud.report.predicted_floor import CAVEAT, verdict_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from thud.base._schema import LimitsSource
-    from thud.floors.prediction import RoomPrediction
     from thud.level.assessment import Criterion, Verdict
 
 # Code of a verdict; the page reads no words.
@@ -115,22 +111,6 @@ def _texts(result: str, words: str, detail: str, why: str = "", also: str = "") 
 
 def _standard(verdict: Verdict) -> str:
     return f"Limits of the {verdict.source.replace('_', ' ')}: {STANDARDS[verdict.source]}."
-
-
-def room_headline(prediction: RoomPrediction) -> dict[str, str]:
-    """Return the headline of the level in a room, of its rating that is asked for."""
-    required, rating = prediction.requirement, prediction.rating
-    also = f", standard uncertainty {rating.uncertainty:.1f} dB"
-    parts = [
-        rating_title(prediction, rating.name), verdict_text(prediction),
-        class_text(prediction.korean_class), source_note(prediction), CAVEAT,
-    ]  # fmt: skip
-    detail = "; ".join(filter(None, parts))
-    level = f"{rating.rounded} dB"
-    if required is None:
-        return _texts("level", level, detail, also)
-    result = RESULTS[required.verdict]
-    return _texts(result, f"{required.verdict}: {level}", detail, f"{also}; {required.chance}")
 
 
 def _listed(causes: Mapping[str, str], unknown: Sequence[str] = ()) -> tuple[str, str]:

@@ -6,7 +6,7 @@ One request shows them; the other modules follow as files.
 from __future__ import annotations
 
 import secrets
-from functools import cache
+from functools import lru_cache
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
@@ -58,7 +58,7 @@ def render_page(first: Mapping[str, Any] | None, address: str) -> tuple[str, str
     return content, _POLICY.format(nonce=nonce)
 
 
-@cache
+@lru_cache(maxsize=8)
 def _import_map(address: str) -> dict[str, dict[str, str]]:
     """Return the import map that has the modules of the first picture as data."""
     texts = {name: (FOLDER / f"{name}.js").read_text(encoding="utf-8") for name in FIRST}

@@ -13,7 +13,7 @@ from thud.explorer.answer import common_answer
 from thud.explorer.criteria import largest_contribution, recording_headline
 from thud.explorer.decisive import decisive_warnings
 from thud.explorer.recording_fields import TABLES
-from thud.plot.impact_figures import contact_force
+from thud.impact.contact_time import contact_force
 from thud.recordings.config import config_from
 from thud.recordings.instruments import ASSUMED_SHARE
 from thud.recordings.read_recording import read_recording

@@ -6,14 +6,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from thud.level.levels import low_pass
+
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
+
+    from thud.base._schema import LevelsForce
+    from thud.impact.floor_impact import FloorImpact
+    from thud.impact.impact import Impact
+    from thud.recordings.recording import Recording
 
 # A contact lasts from the first to the last time at which the moving average of the force reaches
 # this fraction of the peak force.
 THRESHOLD = 0.01
 # Width of the moving average, s; it is narrower near first touch and release.
 AVERAGING_WIDTH = 1e-4
+# Shown time before and after a contact as a fraction of its duration.
+MARGIN = 0.04
 
 
 def contact_span(force: ArrayLike, sample_rate: float) -> tuple[float, float]:
@@ -33,6 +42,20 @@ def contact_span(force: ArrayLike, sample_rate: float) -> tuple[float, float]:
             fraction = (mean[inside] - threshold) / (mean[inside] - mean[outside])
         ends.append((inside + fraction * (outside - inside)) / sample_rate)
     return ends[0], ends[1]
+
+
+def contact_force(
+    impact: Impact | FloorImpact | Recording, kind: LevelsForce
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return time since first touch, ms, and low-passed force, kN, during contact.
+
+    Force plates record no higher frequencies (paper, section 3), at which meshes and modes ring.
+    """
+    time = impact.time - impact.touch_time
+    recorded = low_pass(impact.force(kind), impact.sample_rate)
+    end = time[recorded > THRESHOLD * recorded.max()][-1]
+    shown = (time >= -MARGIN * end) & (time <= (1 + MARGIN) * end)
+    return 1e3 * time[shown], 1e-3 * recorded[shown]
 
 
 def average_within(

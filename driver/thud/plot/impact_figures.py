@@ -12,9 +12,8 @@ from thud.base._schema import (
     LimitsSource,
 )
 from thud.base.checks import refuse
-from thud.impact.contact_time import THRESHOLD
+from thud.impact.contact_time import contact_force
 from thud.level.assessment import octave_limits
-from thud.level.levels import low_pass
 from thud.plot.style import (
     COLORS,
     add_curves,
@@ -33,17 +32,13 @@ from thud.plot.style import (
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    import numpy as np
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
     from thud.export.force_files import BlockedForce
     from thud.impact.impact import Impact
     from thud.plot.style import Curve
 
-# Drawn time before and after the contact, as a fraction of the contact time.
-MARGIN = 0.04
 TIME_LABEL = "Time since first touch, ms"
 
 
@@ -78,20 +73,6 @@ def draw_forces(axes: Axes, impacts: Mapping[str, Curve], force: LevelsForce | N
     axes.locator_params(axis="y", nbins=8)
     axes.set_xlabel(TIME_LABEL)
     axes.set_ylabel(f"{name.capitalize()},\nlow-passed at 1.25 kHz, kN")
-
-
-def contact_force(
-    impact: Curve, kind: LevelsForce
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return time since first touch, ms, and low-passed force, kN, during contact.
-
-    Force plates record no higher frequencies (paper, section 3), at which meshes and modes ring.
-    """
-    time = impact.time - impact.touch_time
-    recorded = low_pass(impact.force(kind), impact.sample_rate)
-    end = time[recorded > THRESHOLD * recorded.max()][-1]
-    shown = (time >= -MARGIN * end) & (time <= (1 + MARGIN) * end)
-    return 1e3 * time[shown], 1e-3 * recorded[shown]
 
 
 @own_style()

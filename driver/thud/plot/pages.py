@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.floors.prediction import rating_title
+from thud.impact.contact_time import contact_force
 from thud.level.assessment import octave_limits
 from thud.level.levels import get_bands
 from thud.plot.impact_figures import (
-    contact_force,
     draw_forces,
     draw_levels,
 )

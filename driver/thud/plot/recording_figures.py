@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.base.checks import require_choice
+from thud.impact.contact_time import MARGIN
 from thud.level.levels import BANDWIDTHS, low_pass
-from thud.plot.impact_figures import MARGIN, TIME_LABEL
+from thud.plot.impact_figures import TIME_LABEL
 from thud.plot.style import (
     COLORS,
     ERROR_BARS,

@@ -12,8 +12,9 @@ from thud.base.bridge import version
 from thud.base.display import draw_all
 from thud.base.tables import csv_text, marked
 from thud.base.workbooks import workbook
+from thud.floors.description import CAVEAT, verdict_text
 from thud.floors.prediction import source_note
-from thud.report.predicted_floor import CAVEAT, tables, verdict_text
+from thud.report.predicted_floor import tables
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

@@ -9,18 +9,16 @@ import numpy as np
 
 from thud.base.bridge import version
 from thud.case.keys import humanize
+from thud.floors.description import CAVEAT, remedy, verdict_text
 from thud.floors.prediction import rating_title, source_note
 from thud.floors.resonances import floor_frequencies, resonances, room_frequencies
 from thud.level.rating import class_text
 from thud.plot.templates import render
 from thud.report.predicted_floor import (
-    CAVEAT,
     band_rows,
     difference_text,
     number_text,
     octave_titles,
-    remedy,
-    verdict_text,
 )
 
 if TYPE_CHECKING:

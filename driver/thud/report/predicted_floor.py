@@ -12,23 +12,19 @@ import numpy as np
 from thud.base._schema import (
     KEYS,
     RATED_BANDS,
-    JoistFloor,
     LaminateFloor,
     MeasuredMobility,
     ModalFloor,
-    Plate,
-    RectangularFloor,
     Room,
 )
 from thud.base.errors import ThudError
 from thud.base.units import display_unit
-from thud.case.constructions import Layer
 from thud.case.keys import humanize
+from thud.floors.description import CONTRIBUTIONS, case_layers, verdict_text
 from thud.floors.prediction import (
     BANDS,
     predict_level,
     rating_title,
-    source_note,
 )
 from thud.floors.resonances import floor_frequencies, resonances, room_frequencies
 from thud.level.levels import get_bands
@@ -42,32 +38,13 @@ if TYPE_CHECKING:
     from thud.base._schema import FloorOptions
     from thud.base.display import Columns
     from thud.base.key import Key
-    from thud.case.constructions import Construction
+    from thud.case.constructions import Construction, Layer
     from thud.floors.prediction import RoomPrediction
 
     Array = NDArray[np.float64]
     Cells = tuple[str | float, ...]
 
 
-class Contribution(NamedTuple):
-    """A contribution to the uncertainty of a rating in words, and what would make it smaller."""
-
-    title: str
-    remedy: str
-
-
-# What no data of the floor can tell, beside each rating.
-CAVEAT = "rigid boxes, no measurement behind it"
-# Contributions to the uncertainty of a rating.
-CONTRIBUTIONS = {
-    "edges": Contribution("support of the edges", "a stated support, or the modes of the floor"),
-    "floor_and_room": Contribution(
-        "data of floor and room",
-        "measured data of the materials and the reverberation time",
-    ),
-    "source": Contribution("another source that conforms", "a measured force of the source"),
-    "model": Contribution("the model: rigid boxes", "a measurement in the building"),
-}
 # Beginnings of the names of keys without effect if another key has a value.
 _WITHOUT_EFFECT: dict[tuple[str, object], tuple[str, ...]] = {
     ("screed_thickness", 0.0): ("screed_", "layer_stiffness", "layer_loss_factor"),
@@ -98,13 +75,6 @@ _FACTORS = {
     "stiffness of the channels halved": ("channel_stiffness", 0.5, "subceiling_thickness"),
     "mass of the subceiling doubled": ("subceiling_density", 2.0, "subceiling_thickness"),
 }
-# Thicknesses that a case does not state, for its drawing, m.
-_LAYER, _BOARD = 0.02, 0.0125
-# Density that gives the drawn thickness of an added mass, kg/m3: that of loose gravel.
-_GRAVEL_DENSITY = 1500.0
-# Thicknesses of the layers of a laminate by default, m.
-_LAMELLAS = (0.04, 0.02, 0.04, 0.02, 0.04)
-_ASSUMED = "(thickness assumed)"
 # Maximum number of values of a key that are listed.
 _MAX_SHOWN = 12
 # Keys that are the requirement, no assumptions.
@@ -145,7 +115,7 @@ class PredictedFloor:
         """Layers from top to bottom; of a case, those that its keys describe."""
         if self.construction:
             return self.construction.layers
-        return tuple(_case_layers(self.prediction))
+        return case_layers(self.prediction.floor, self.prediction.room)
 
     @property
     def contributions(self) -> dict[str, float]:
@@ -259,22 +229,6 @@ class PredictedFloor:
             "clamped, dB": (of_edges(prediction.clamped_level), ".1f"),
             "standardized, dB": (prediction.standardized, ".1f"),
         }
-
-
-def remedy(prediction: RoomPrediction) -> str:
-    """Return what would reduce the largest contribution to the uncertainty of the rating."""
-    return CONTRIBUTIONS[next(iter(prediction.rating.contributions))].remedy
-
-
-def verdict_text(prediction: RoomPrediction) -> str:
-    """Return probability and verdict on a requirement, and what would decide it; else nothing."""
-    required = prediction.requirement
-    if required is None:
-        return ""
-    text = f"{required.chance}: {required.verdict}"
-    if required.verdict != "undecided":
-        return text
-    return f"{text}; {source_note(prediction) or f'to decide it: {remedy(prediction)}'}"
 
 
 def difference_text(change: Change) -> str:
@@ -409,39 +363,3 @@ def _variants(
         yield "mass of the ceiling doubled", floor, heavy
     times = tuple((2 * np.atleast_1d(room.reverberation_time)).tolist())
     yield "reverberation time doubled", floor, replace(room, reverberation_time=times)
-
-
-def _case_layers(prediction: RoomPrediction) -> Iterator[Layer]:
-    """Yield the layers that the keys of floor and room describe, from top to bottom."""
-    floor, room = prediction.floor, prediction.room
-    built = floor if isinstance(floor, RectangularFloor) else None
-    if built and built.screed_thickness:
-        yield Layer(f"floating plate, {built.screed_density:g} kg/m³", built.screed_thickness)
-        yield Layer(f"resilient layer {_ASSUMED}", _LAYER)
-    below = built if built and built.subceiling_thickness else None
-    cavity = below.cavity_depth if below else room.ceiling_depth if room.ceiling_mass else 0.0
-    if isinstance(floor, JoistFloor):
-        yield Layer(f"sheathing, {floor.sheathing_density:g} kg/m³", floor.sheathing_thickness)
-        width, spacing = floor.joist_width, floor.spacing
-        mean_density = floor.joist_density * width / spacing
-        yield Layer("joists", floor.joist_height, mean_density, width, spacing)
-        cavity -= floor.joist_height
-    elif isinstance(floor, LaminateFloor):
-        if floor.added_mass:
-            added = f"added mass, {floor.added_mass:g} kg/m² {_ASSUMED}"
-            yield Layer(added, floor.added_mass / _GRAVEL_DENSITY)
-        # By default the key is empty.
-        for i, thickness in enumerate(floor.layer_thickness or _LAMELLAS):
-            yield Layer(f"lamella, {'across' if i % 2 else 'along'}", thickness)
-    else:
-        # No other floor radiates.
-        assert isinstance(floor, Plate | ModalFloor | MeasuredMobility)  # noqa: S101
-        kind = "plate" if isinstance(floor, Plate) else "plate like the floor"
-        yield Layer(f"{kind}, {floor.density:g} kg/m³", floor.thickness)
-    if round(cavity, 6) > 0:
-        yield Layer("cavity", round(cavity, 6), room.air_density)
-    if below:
-        density = f"{below.subceiling_density:g} kg/m³"
-        yield Layer(f"subceiling, {density}", below.subceiling_thickness)
-    if room.ceiling_mass:
-        yield Layer(f"ceiling, {room.ceiling_mass:g} kg/m² {_ASSUMED}", _BOARD)

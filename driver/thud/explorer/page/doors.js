@@ -3,6 +3,7 @@ import { byId, button, element, saveFile } from "./page.js";
 import { setFragment } from "./request.js";
 import { hideTip, showAnswer, showFloors, showWarnings } from "./results.js";
 import { showBall } from "./ball.js";
+import { showRatings, showSection } from "./section.js";
 import { closePress } from "./press.js";
 import { caseValues, isTyping, state, takeValues } from "./form.js";
 import { buildDoor, keepStated, recording, recordingBody, showAsks } from "./recording.js";
@@ -71,7 +72,9 @@ function showAnswers() {
   showAnswer(variants, view);
   showWarnings(own);
   showFloors(variants);
-  showBall(door === "recording" ? null : own.answer.motion);
+  showBall(own.answer.motion);
+  showSection(own.answer);
+  showRatings(variants);
   showVariants(variants, { remove: removeVariant, rename: renameVariant });
   showSounds(own.answer.room ? variants : [], showError);
   if (door === "recording") byId("next").append(...toAsks(own.answer.asks), button("Calibration report", saveReport, { class: "strong", id: "report" }), button("Fit a ball to this recording", fit, { id: "fit" }));
@@ -100,7 +103,7 @@ function showNothing(door) {
   byId("detail").textContent = door === "recording" ? RECORDING_TEXT : "";
   delete byId("detail").dataset.subject;
   byId("open_warnings").replaceChildren();
-  for (const id of ["warnings_section", "ball_section", "room_figure", "contributions_figure", "ratings_section", "floor_section", "sound_section"]) byId(id).hidden = true;
+  for (const id of ["warnings_section", "ball_section", "section_section", "room_figure", "contributions_figure", "ratings_section", "floor_section", "sound_section"]) byId(id).hidden = true;
   for (const id of ["levels_figure", "force_figure", "criteria_section"]) byId(id).hidden = door === "recording";
 }
 

@@ -7,6 +7,8 @@ const UNCERTAINTIES = { numerical: ["numerical error", "numerical error of the c
 // Verdicts on a source, and signs, by the code of the result.
 export const SOURCE_VERDICTS = { conforms: "conforms", does_not_conform: "does not conform", undecided: "undecided" };
 const SIGNS = { conforms: "✓", does_not_conform: "✕", undecided: "?", level: "" };
+// Titles of the force by its code.
+const FORCES = { elastic: "Elastic force", floor: "Force on the floor" };
 // Uncertainties that are smaller are not drawn, dB.
 const MIN_UNCERTAINTY = 0.02;
 
@@ -76,7 +78,7 @@ function showForces(variants, { thirds, differences }) {
     const onFloor = floor && !isDifference ? [{ name: `${variant.label}, on the floor`, style: variant.style, x: floor.force.time, y: floor.force.value, thin: true }] : [];
     return [{ name: variant.label, style: variant.style, x: force.time, y }, ...onFloor];
   });
-  byId("force_title").textContent = capitalize(first.answer.force.title ?? "force on the floor");
+  byId("force_title").textContent = FORCES[first.answer.force.kind ?? "floor"];
   plot(byId("force"), {
     title: byId("force_title").textContent, curves, hasCursor: !isDifference,
     x: { title: "Time", unit: "ms" },
@@ -90,7 +92,7 @@ const minusLevel = (level, reference) => (level === null || reference === null ?
 function showRooms(variants, { differences }) {
   const rooms = variants.filter((variant) => variant.answer.room);
   const hasRoom = Boolean(variants[0].answer.room);
-  for (const name of ["room_figure", "contributions_figure", "ratings_section"]) byId(name).hidden = !hasRoom;
+  for (const name of ["room_figure", "contributions_figure"]) byId(name).hidden = !hasRoom;
   if (!hasRoom) return;
   const [first] = rooms;
   const isDifference = differences && rooms.length > 1;
@@ -109,7 +111,6 @@ function showRooms(variants, { differences }) {
     title: "Contributions to the standard uncertainty", x: { title: "Standard uncertainty", unit: "dB" },
     rows: first.answer.room.contributions.filter(([, , value]) => value >= 0.05),
   });
-  byId("ratings").replaceChildren(...rooms.map((variant) => element("li", {}, ...nameOf(variants, variant), ...withSymbols(variant.answer.room.ratings))));
 }
 
 /** Return the swatch and the name of a variant; empty if there is only one variant. */

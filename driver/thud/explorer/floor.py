@@ -1,0 +1,130 @@
+"""What the page shows of a floor and the room below: section, response, levels and ratings."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from thud.base._schema import RATED_BANDS, Room
+from thud.case.keys import humanize
+from thud.explorer.criteria import RESULTS
+from thud.explorer.models import MODEL_FACTS
+from thud.explorer.series import curve, to_json
+from thud.floors.description import CAVEAT, CONTRIBUTIONS, case_layers, verdict_text
+from thud.floors.prediction import rating_title, source_note
+from thud.impact.contact_time import contact_force
+from thud.level.rating import class_text
+
+if TYPE_CHECKING:
+    from thud.case.case import Case
+    from thud.floors.prediction import RoomPrediction
+    from thud.impact.floor_impact import FloorImpact
+    from thud.impact.impact import Impact
+
+    Answer = dict[str, Any]
+
+# Maximum density of a layer that is air, kg/m3.
+MAX_AIR = 2.0
+
+
+def section(case: Case) -> Answer | None:
+    """Return what a section shows: source, and layers from top to bottom; lengths in m.
+
+    None for a floor without layers. The radius of a source that is no ball is 0.
+    """
+    room = case.room or Room()
+    layers = case_layers(case.floor, room) if case.floor else ()
+    if not layers:
+        return None
+    facts = MODEL_FACTS.get(case.model.name if case.model else "")
+    is_ball = not facts or "outer_radius" not in facts.unused
+    return {
+        "radius": case.ball.outer_radius if is_ball else 0.0,
+        "height": case.drop.height,
+        "layers": [
+            {
+                "name": layer.description,
+                "thickness": layer.thickness,
+                "width": layer.width,
+                "spacing": layer.spacing,
+                "is_air": 0 < layer.density < MAX_AIR,
+            }
+            for layer in layers
+        ],
+    }
+
+
+def floor_answer(impact: Impact, on_floor: FloorImpact) -> Answer:
+    """Return force and velocity of a mobile floor, its quantities, and a table of octaves."""
+    shown = np.flatnonzero(on_floor.time <= on_floor.touch_time + 2 * on_floor.contact_time)
+    times = 1e3 * (on_floor.time - on_floor.touch_time)
+    contact = contact_force(on_floor, "floor")
+    header, *rows = on_floor.rows()
+    change = 20 * np.log10(on_floor.peak_force / impact.peak_force)
+    return {
+        "name": humanize(on_floor.floor.name),
+        "force": curve(contact[0], 1e3 * contact[1]),
+        "velocity": curve(times[shown], 1e3 * on_floor.floor_velocity[shown]),
+        "numbers": [
+            ["peak force relative to rigid floor", change, "dB"],
+            ["restitution", on_floor.restitution, ""],
+            ["maximum displacement", 1e3 * on_floor.floor_displacement.max(), "mm"],
+            ["energy into the floor", on_floor.floor_work, "J"],
+        ],
+        "header": header,
+        "rows": rows,
+    }
+
+
+def room_answer(prediction: RoomPrediction) -> Answer:
+    """Return levels in the room below, dB, the room, m, m3 and s, and ratings with uncertainty."""
+    room, floor = prediction.room, prediction.floor
+    length, width = (getattr(room, side) or getattr(floor, side) for side in ("length", "width"))
+    return {
+        "frequency": to_json(prediction.frequency),
+        "level": to_json(prediction.level),
+        "uncertainty": to_json(prediction.uncertainty),
+        "contributions": [
+            [CONTRIBUTIONS[name].title, -value, value]
+            for name, value in prediction.rating.contributions.items()
+        ],
+        "size": {
+            "length": length,
+            "width": width,
+            "height": room.height or prediction.volume / (length * width),
+            "volume": prediction.volume,
+            "reverberation_time": float(np.mean(prediction.reverberation_time)),
+        },
+        "ratings": [
+            [rating_title(prediction, name), rating.level, rating.uncertainty]
+            for name, rating in prediction.ratings.items()
+        ],
+        "class": class_text(prediction.korean_class),
+        "octaves": [
+            [f"{frequency:g}", level]
+            for frequency, level in zip(
+                RATED_BANDS["octave"], prediction.octave_level.tolist(), strict=True
+            )
+        ],
+    }
+
+
+def room_headline(prediction: RoomPrediction) -> dict[str, str]:
+    """Return the headline of the level in a room, of its rating that is asked for.
+
+    It has the code of the result, words, causes, what narrow screens omit, and a detail.
+    """
+    required, rating = prediction.requirement, prediction.rating
+    level = words = f"{rating.rounded} dB"
+    why = f", standard uncertainty {rating.uncertainty:.1f} dB"
+    result = "level"
+    if required is not None:
+        result, words = RESULTS[required.verdict], f"{required.verdict}: {level}"
+        why += f"; {required.chance}"
+    parts = [
+        rating_title(prediction, rating.name), verdict_text(prediction),
+        class_text(prediction.korean_class), source_note(prediction), CAVEAT,
+    ]  # fmt: skip
+    detail = "; ".join(filter(None, parts))
+    return {"result": result, "words": words, "why": why, "also": "", "detail": detail}
