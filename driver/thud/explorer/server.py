@@ -27,7 +27,6 @@ from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
 from thud.base._schema import KEYS
-from thud.base.bridge import version
 from thud.base.checks import refuse
 from thud.case.case import read_case
 from thud.case.keys import humanize
@@ -147,7 +146,6 @@ def new_application(
         "floors": floors,
         "presets": presets(),
         "glossary": glossary(),
-        "version": version(),
         "start": start,
         "max_recording": MAX_RECORDING,
     }

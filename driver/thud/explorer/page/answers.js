@@ -1,8 +1,8 @@
 // Requests and answers of the doors: which answers are current, messages, and the tasks of the server.
 import { byId, button, element } from "./page.js";
 import { ConnectionError, ServerError, ask, follow } from "./request.js";
-import { about, caseValues, invalidField, isTyping, markField, state } from "./form.js";
-import { isLaboratory, recording, recordingBody, recordingRequest, statedRows } from "./recording.js";
+import { about, caseValues, isTyping, markField, state } from "./form.js";
+import { isLaboratory, recording, recordingBody, recordingRequest } from "./recording.js";
 
 // Pause before a slow case is requested, and before outdated results are dimmed, ms.
 export const PAUSE = 120;
@@ -59,8 +59,6 @@ export function showStatus(delay = 0) {
   byId("panel").setAttribute("aria-busy", String(Boolean(job || timer)));
   const show = () => {
     document.body.classList.toggle("outdated", isOutdated);
-    // Like a download, saving the page names an invalid field.
-    byId("save_page").disabled = isOutdated && !invalidField();
     for (const target of [byId("report"), ...document.querySelectorAll(".figure .menu button")]) if (target) target.disabled = isOutdated;
   };
   if (isOutdated && delay) dimTimer = setTimeout(show, delay);
@@ -209,13 +207,12 @@ async function compute(thisJob, door) {
 
 async function assess(thisJob) {
   const [{ name }, ...others] = recording.files.filter((file) => !isLaboratory(file));
-  const stated = statedRows();
   const { values } = recordingRequest();
   const title = `Assessing ${recording.files.map((file) => file.name).join(", ")}`;
   const answer = await runTask(title, "measure", recordingBody(), thisJob.controller, { showNow: true });
   const drops = `${answer.drops} drop${answer.drops === 1 ? "" : "s"}`;
   const asks = answer.asks.filter((ask) => Object.keys(ask.values).some((key) => !(key in values)));
-  return { name: `${others.length ? `${name} and ${others.length} more` : name}, ${drops}`, stated, answer: { ...answer, asks } };
+  return { name: `${others.length ? `${name} and ${others.length} more` : name}, ${drops}`, answer: { ...answer, asks } };
 }
 
 /** Cancel the computation that runs, and the one that waits. */

@@ -1,13 +1,13 @@
 // Start of the page: its menu, links, keys and files, and the case with which it begins.
 import { byId, button, element, saveFile } from "./page.js";
 import { ConnectionError, ask, firstAbout, fragment, setFragment, takeFragment } from "./request.js";
-import { hideTip, showPlots } from "./results.js";
+import { hideTip } from "./results.js";
 import { firstVariant } from "./first.js";
 import { listenToBall } from "./ball.js";
 import { about, caseValues, invalidField, isCase, state, takeValues } from "./form.js";
 import { addFiles, recording } from "./recording.js";
 import { freeStyle } from "./variants.js";
-import { addPlotMenus, copyText, fileOf, pageOf } from "./files.js";
+import { addPlotMenus, copyText, fileOf } from "./files.js";
 import { RETRY_INTERVAL, current, hideMessage, holdForClicks, kept, once, reconnect, runTask, showError, showMessage } from "./answers.js";
 import { commit, restoreStored } from "./steps.js";
 import { DOORS, formHandlers, keep, move, openDoor, showAll, variantsOfDoor } from "./doors.js";
@@ -20,7 +20,7 @@ async function copyLink() {
   const isCopied = await copyText(address, "Copy this link");
   if (isCopied) flash("link", "Link copied");
   const hasRecording = kept.list.some(({ values }) => !values) || state.door === "recording";
-  showNote(`The link works in browsers that have opened the full address shown in the terminal, while the server runs. For others use “Save as HTML”.${hasRecording ? " It holds the models; recordings are too large for a link." : ""}`);
+  showNote(`The link works in browsers that have opened the full address shown in the terminal, while the server runs. For others print the page to a PDF.${hasRecording ? " It holds the models; recordings are too large for a link." : ""}`);
 }
 
 /** Show a note in front of the page until it is closed. */
@@ -97,15 +97,6 @@ function hasInvalidField() {
   return Boolean(input);
 }
 
-/** Save the page of all variants; its plots show the values, not their differences. */
-function savePage() {
-  const variants = variantsOfDoor();
-  if (hasInvalidField() || !variants.length) return;
-  showPlots(variants, { thirds: state.view.thirds });
-  saveFile("thud.html", pageOf(variants, about.version), "text/html");
-  showAll();
-}
-
 async function download(name, copyButton) {
   if (hasInvalidField()) return;
   const values = caseValues();
@@ -134,7 +125,8 @@ function listen() {
   byId("redo").addEventListener("click", () => move(1));
   byId("reset").addEventListener("click", reset);
   byId("link").addEventListener("click", copyLink);
-  byId("save_page").addEventListener("click", savePage);
+  byId("print").addEventListener("click", () => print());
+  addEventListener("beforeprint", () => { byId("warnings_section").open = true; });
   for (const name of Object.keys(state.view)) byId(name).addEventListener("change", () => { state.view[name] = byId(name).checked; showAll(); });
   for (const target of document.querySelectorAll("[data-file]")) target.addEventListener("click", () => download(target.dataset.file));
   for (const target of document.querySelectorAll("[data-copy]")) target.addEventListener("click", () => download(target.dataset.copy, target));

@@ -8,9 +8,6 @@ export const recording = { files: [] };
 /** What the answer asks for, between the files and the other fields. */
 const asked = element("div", { id: "asks", role: "group", "aria-label": "Missing values", hidden: true });
 
-/** Return the name of a field and what is stated in it, for each stated one. */
-export const statedRows = () => about.recording.filter(({ name }) => name in state.recording).map(({ name, label, choices }) => [label, choices[state.recording[name]] ?? state.recording[name]]);
-
 /** Return what is stated, numbers as the server reads them, and the files. */
 export function recordingRequest() {
   const values = Object.fromEntries(about.recording.filter(({ name }) => name in state.recording).map(({ name, kind }) => {

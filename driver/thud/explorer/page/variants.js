@@ -99,20 +99,6 @@ function wordsOf(key, values, hasBase) {
   return `${WORDS[key] ?? `${owner}${label?.toLowerCase() ?? name}`}${changed} ${valueText(values, key)}`;
 }
 
-/** Return values as rows of label and text, for pages: the main ones, and those that differ from their defaults. */
-export function inputRows(values) {
-  const rows = [["Source", factsOf("model", values.model.name).title]];
-  if (values.floor) rows.push(["Floor", factsOf("floor", values.floor.name).title]);
-  const stated = ({ group, name }) => values[group]?.[name];
-  const isMain = ({ advanced, models, condition }) => !advanced && models?.includes(values.model.name) !== false
-    && (!condition || condition.values.includes(stated(condition) ?? defaultOf(findField(condition.group, condition.name), values.model.name)));
-  for (const { part, name, title, fields } of about.form) {
-    if (!(part === "room" ? values.room : part === name || values[part]?.name === name)) continue;
-    for (const field of fields) if (stated(field) !== undefined || isMain(field)) rows.push([`${field.label} (${title.toLowerCase()})`, valueText(values, `${field.group}.${field.name}`)]);
-  }
-  return rows;
-}
-
 /** Show the table of variants, of which the first belongs to the form; `actions` remove and rename one. */
 export function showVariants(variants, { remove, rename }) {
   const isRoom = variants.every(({ answer }) => answer.room);
