@@ -702,7 +702,7 @@ def test_bad_values_get_a_sentence(client: TestClient, values: object, words: st
     assert "\n" not in response.text
 
 
-@pytest.mark.parametrize("path", ["/solve", "/improve", "/download/study.toml", "/press", "/fit"])
+@pytest.mark.parametrize("path", ["/solve", "/improve", "/download/case.nml", "/press", "/fit"])
 @pytest.mark.parametrize(
     "place",
     [
@@ -710,7 +710,6 @@ def test_bad_values_get_a_sentence(client: TestClient, values: object, words: st
         '{"drop": %s}',
         '{"drop": {"height": %s}}',
         '{"drop": {"height": [%s]}}',
-        '{"moved": {"drop.height": %s}}',
     ],
 )
 @pytest.mark.parametrize("depth", [3, 900, 3000])
@@ -1051,59 +1050,6 @@ def test_sound_in_the_room_is_that_of_the_case(client: TestClient) -> None:
     assert re.search(naming("floor"), answer.text)
     # The page plays what it has downloaded with its token, and no other sound.
     assert "media-src blob:;" in client.get("/").headers["content-security-policy"]
-
-
-def test_study_of_what_was_moved_runs(client: TestClient, tmp_path: Path) -> None:
-    values = SHELL | {
-        "ball": {"mass": 2.4},
-        "moved": {"drop.height": [1.0, 0.5], "room.volume": [1, 2]},
-    }
-    path = tmp_path / "study.toml"
-    path.write_bytes(client.post("/download/study.toml", json=values).content)
-    content = tomllib.loads(path.read_text())
-    assert content["case"] == SHELL | {"ball": {"mass": 2.4}}
-    assert content["parameters"] == {"height": {"low": 0.5, "high": 1.0, "count": 11}}
-    found = thud.sweep(path).dataset
-    assert found.sizes == {**found.sizes, "height": 11}
-    assert client.post("/download/study.toml", json=SHELL).status_code == 400
-
-
-@pytest.mark.parametrize(
-    "moved",
-    [
-        5,
-        [],
-        {"drop.height": 1},
-        {"drop.height": []},
-        {"drop.height": [1]},
-        {"drop.height": ["a", "b"]},
-        {"drop.height": ["a", 1]},
-        {"sampling.substeps": [1, 10**400]},
-    ],
-)
-def test_study_of_no_moves_gets_a_sentence(client: TestClient, moved: object) -> None:
-    answer = client.post("/download/study.toml", json=SHELL | {"moved": moved})
-    assert answer.status_code == 400
-    assert ("move" if isinstance(moved, dict) else "groups") in answer.text
-    assert "lack of memory" not in answer.text
-
-
-def test_study_varies_model_floor_and_room(client: TestClient, tmp_path: Path) -> None:
-    values: dict[str, Any] = {"model": {"name": "modal_ball"}, "floor": {"name": "plate"}}
-    values |= {"room": {}, "modal_ball": {"loss_factor": 0.2}, "plate": {"edges": "absorption"}}
-    moved = {"plate.thickness": [0.14, 0.2], "modal_ball.rings": [40, 43]}
-    path = tmp_path / "study.toml"
-    path.write_bytes(client.post("/download/study.toml", json=values | {"moved": moved}).content)
-    content = tomllib.loads(path.read_text())
-    assert content["case"] == values
-    assert content["parameters"]["plate.thickness"] == {"low": 0.14, "high": 0.2, "count": 11}
-    assert content["parameters"]["rings"] == {"low": 40, "high": 43, "count": 4}
-    study = thud.read_study(path, "sweep")
-    assert study.case.floor == thud.Plate(edges="absorption")
-    more = {"room.volume": [20, 50], **moved}
-    content = tomllib.loads(client.post("/download/study.toml", json=values | {"moved": more}).text)
-    assert content["design"] == {"kind": "sobol", "size": 256, "seed": 1}
-    assert list(content["parameters"]) == ["room.volume", "plate.thickness", "rings"]
 
 
 def test_page_starts_with_a_case_or_results(tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from thud.base._schema import VERDICTS
 from thud.report.page import STANDARDS
@@ -167,8 +167,3 @@ def _number(criterion: Criterion, value: float) -> str:
 
 def _shown(criterion: Criterion, value: float) -> str:
     return f"{_number(criterion, value)} {criterion.quantity.display_unit}".rstrip()
-
-
-def glossary() -> dict[str, Any]:
-    """Return the explanations of the criteria by their names."""
-    return {"octave": OCTAVE, **{key.replace("_", " "): text for key, text in EXPLANATIONS.items()}}

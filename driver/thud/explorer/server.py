@@ -30,7 +30,6 @@ from thud.base._schema import KEYS
 from thud.base.checks import refuse
 from thud.case.case import read_case
 from thud.case.keys import humanize
-from thud.explorer.criteria import glossary
 from thud.explorer.downloads import DOWNLOADS
 from thud.explorer.form import construction_form, form
 from thud.explorer.jobs import INPUT_ERRORS, Jobs
@@ -145,7 +144,6 @@ def new_application(
         "models": model_facts(),
         "floors": floors,
         "presets": presets(),
-        "glossary": glossary(),
         "start": start,
         "max_recording": MAX_RECORDING,
     }

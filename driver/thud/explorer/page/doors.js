@@ -32,7 +32,7 @@ function changePage(change) {
 }
 
 /** Return the variants of the current door, its own first. */
-export function variantsOfDoor() {
+function variantsOfDoor() {
   const { door } = state;
   const own = current[door];
   if (own) own.title = titleOfDoor(door);

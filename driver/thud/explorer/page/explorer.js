@@ -10,7 +10,7 @@ import { freeStyle } from "./variants.js";
 import { addPlotMenus, copyText, fileOf } from "./files.js";
 import { RETRY_INTERVAL, current, hideMessage, holdForClicks, kept, once, reconnect, runTask, showError, showMessage } from "./answers.js";
 import { commit, restoreStored } from "./steps.js";
-import { DOORS, formHandlers, keep, move, openDoor, showAll, variantsOfDoor } from "./doors.js";
+import { DOORS, formHandlers, keep, move, openDoor, showAll } from "./doors.js";
 
 async function copyLink() {
   if (hasInvalidField()) return;
@@ -83,7 +83,7 @@ function reset() {
 
 /** Begin with the values of a case, or with the first preset. */
 function begin(start) {
-  Object.assign(state, { values: {}, unknowns: {}, moved: {}, recording: {}, earlier: [], titles: {}, model: about.presets[0].values.model.name });
+  Object.assign(state, { values: {}, unknowns: {}, recording: {}, earlier: [], titles: {}, model: about.presets[0].values.model.name });
   const floors = about.presets.find((preset) => preset.door === "floor");
   takeValues(floors.values);
   if (Object.keys(start).length) takeValues(start);
@@ -100,7 +100,6 @@ function hasInvalidField() {
 async function download(name, copyButton) {
   if (hasInvalidField()) return;
   const values = caseValues();
-  if (name === "study.toml") values.moved = state.moved;
   try {
     const file = await fileOf(name, values);
     if (!copyButton) saveFile(name, file);

@@ -2,9 +2,9 @@
 import { button, byId, capitalize, element, numberOf, numberProblem, scaled } from "./page.js";
 import { pressInputs } from "./press.js";
 
-/** What the server says of itself, and the case: values that differ from their defaults, the construction that was chosen, ranges of moved fields, what is not known, by model, fields of the recording and those that were stated for an earlier one, names of the user, and what the plots show. */
+/** What the server says of itself, and the case: values that differ from their defaults, the construction that was chosen, what is not known, by model, fields of the recording and those that were stated for an earlier one, names of the user, and what the plots show. */
 export const about = { form: [], constructions: [], models: [], floors: [], presets: [], recording: [], press: [] };
-export const state = { door: "ball", model: "", floor: "plate", chosen: "", room: true, values: {}, unknowns: {}, moved: {}, recording: {}, earlier: [], titles: {}, view: { thirds: false, differences: false } };
+export const state = { door: "ball", model: "", floor: "plate", chosen: "", room: true, values: {}, unknowns: {}, recording: {}, earlier: [], titles: {}, view: { thirds: false, differences: false } };
 
 // Digits of a number in its field.
 const DIGITS = 6;
@@ -291,10 +291,6 @@ function fieldElement(field, handlers, source) {
   const id = `${field.group}.${field.name}`;
   const onInput = (value) => {
     const changesFields = about.form.some(({ fields }) => fields.some(({ condition }) => condition?.group === field.group && condition.name === field.name));
-    if (typeof value === "number") {
-      const ends = (state.moved[id] ??= [valueOf(field), valueOf(field)]);
-      state.moved[id] = [Math.min(ends[0], value), Math.max(ends[1], value)];
-    }
     setValue(field, value);
     byId(`${id}.help`).textContent = helpOf(field);
     if (changesFields) handlers.rebuild();
