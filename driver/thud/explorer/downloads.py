@@ -18,7 +18,6 @@ from thud.impact.compute import compute
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-
     Values = dict[str, dict[str, Any]]
 
 

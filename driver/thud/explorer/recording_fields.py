@@ -2,19 +2,36 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+import re
+from dataclasses import dataclass, field, fields
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from thud.base.checks import refuse, shown
+from thud.base.checks import refuse, require_choice, shown
+from thud.case.keys import humanize
+from thud.recordings.config import Config
+from thud.recordings.response import Plate, RecorderFilter
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
+
+    from thud.base.toml_tables import TomlTable
 
     Table = dict[str, Any]
 
 # Tables of a configuration; the names of their fields begin with that of the table.
-TABLES = ("plate", "filter")
+TABLES: dict[str, type[TomlTable]] = {"plate": Plate, "filter": RecorderFilter}
 PERCENT = "%"
+# Keys with a field, and those whose fields are folded away.
+SHOWN = (
+    "height", "mass", "calibration", "unit", "channel", "channels", "drops", "source", "plate_f0",
+    "plate_Q",
+)  # fmt: skip
+FOLDED = (
+    "height_uncertainty", "mass_uncertainty", "calibration_uncertainty", "plate_f0_uncertainty",
+    "plate_share", "plate_flat_limit", "filter_kind", "filter_order", "filter_cutoff",
+    "filter_cutoff_uncertainty", "polarity", "sample_rate", "laboratory", "ball", "serial",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -32,7 +49,7 @@ class Field:
     unit : str
         Unit of a number: that of the key, or ``"%"`` for a fraction.
     hint : str
-        Rest of the label, such as an example.
+        What is shown in the empty field, such as an example.
     choices : mapping
         Texts of the allowed values, if they are a choice.
     folded : bool
@@ -76,39 +93,33 @@ class Field:
         return int(number) if number.is_integer() else number
 
 
-FILTERS = {"none": "flat", "bessel": "Bessel", "butterworth": "Butterworth"}
-SOURCES = {"rubber_ball": "rubber ball", "tyre": "tyre"}
-POLARITIES = {"positive": "positive", "negative": "negative"}
-FIELDS = (
-    Field("height", "Drop height, m"),
-    Field("mass", "Mass, kg"),
-    Field("calibration", "Calibration", "text", hint=", such as 250 N/V"),
-    Field("unit", "Unit of the values", "text", hint=", such as kN"),
-    Field("channel", "Channel", "text", hint=", by number or name"),
-    Field("channels", "Load cells to be added", "text", hint=", such as F1+F2+F3+F4, or sum"),
-    Field("drops", "Drops", "text", hint=", such as 1-5 (all)"),
-    Field("height_uncertainty", "Uncertainty of the drop height, m", folded=True),
-    Field("mass_uncertainty", "Uncertainty of the mass, kg", folded=True),
-    Field(
-        "calibration_uncertainty", "Uncertainty of the calibration, %",
-        unit=PERCENT, folded=True,
-    ),
-    Field("source", "Source", "choice", choices=SOURCES),
-    Field("plate_f0", "First resonance of the force plate, Hz"),
-    Field("plate_Q", "Quality factor of the force plate"),
-    Field("plate_f0_uncertainty", "Uncertainty of this resonance, %", unit=PERCENT, folded=True),
-    Field("plate_share", "Share of this resonance in the static response", folded=True),
-    Field("plate_flat_limit", "Force plate flat within 2 % up to, Hz", folded=True),
-    Field("filter_kind", "Filter of the recorder", "choice", choices=FILTERS, folded=True),
-    Field("filter_order", "Order of the filter", folded=True),
-    Field("filter_cutoff", "Cutoff of the filter (−3 dB), Hz", folded=True),
-    Field("filter_cutoff_uncertainty", "Uncertainty of the cutoff, %", unit=PERCENT, folded=True),
-    Field("polarity", "Sign of a compression", "choice", choices=POLARITIES, folded=True),
-    Field("sample_rate", "Sample rate, Hz", folded=True),
-    Field("laboratory", "Laboratory", "text", folded=True),
-    Field("ball", "Name of the ball", "text", folded=True),
-    Field("serial", "Serial number", "text", folded=True),
-)  # fmt: skip
+def _fields() -> Iterator[Field]:
+    """Yield the fields, from the declarations of their keys."""
+    for name in (*SHOWN, *FOLDED):
+        table, key = Field(name, "").path
+        owner = TABLES[table] if table else Config
+        declared = next(entry.metadata for entry in fields(owner) if entry.name == key)
+        check, meaning = declared["check"], declared["meaning"]
+        # Further clauses are hints.
+        title, *hints = re.split(r"[,:] ", meaning, maxsplit=1)
+        hint = "".join(hints)
+        words = title.partition(" of the ")[0] if key in {"height", "mass"} else title
+        label = f"{humanize(table)} of the recorder: {words}" if table == "filter" else words
+        label = f"Force plate: {words}" if table == "plate" else label
+        label = label[:1].upper() + label[1:].replace(" -", " −")
+        if not isinstance(check, partial):
+            yield Field(name, label, "text", hint=hint, folded=name in FOLDED)
+        elif check.func is require_choice:
+            choices = {word: humanize(word) for word in check.keywords["allowed"]}
+            yield Field(name, label, "choice", choices=choices, folded=name in FOLDED)
+        else:
+            is_fraction = title.startswith("relative ")
+            unit = PERCENT if is_fraction else check.keywords.get("unit", "")
+            label = ", ".join(filter(None, (label, unit)))
+            yield Field(name, label, unit=unit, folded=name in FOLDED)
+
+
+FIELDS = tuple(_fields())
 
 # Units of the columns of the curve of a press, if their titles state none.
 PRESS_FIELDS = (
@@ -126,16 +137,11 @@ PRESS_FIELDS = (
 def recording_table(stated: Mapping[str, str]) -> Table:
     """Return the table of a configuration from the texts of fields, by name.
 
-    Raise InputError for a text that is not a number, or if a table lacks a choice.
+    Raise InputError for a text that is not a number.
     """
     result: Table = {}
     for item in FIELDS:
         if item.name in stated:
             table, key = item.path
             (result.setdefault(table, {}) if table else result)[key] = item.value(stated[item.name])
-    for item in FIELDS:
-        table, key = item.path
-        if item.choices and table in result and key not in result[table]:
-            allowed = ", ".join(item.choices.values())
-            refuse("is not chosen", allowed, name=item.key)
     return result

@@ -236,7 +236,7 @@ class Config(TomlTable):
     )
     unit: str | None = key(to_unit, "unit of the recorded values, if the file does not state it")
     calibration: Calibration | float | tuple[Calibration | float, ...] | None = key(
-        to_calibrations, 'factors such as 250, "250 N/V" or "4.1 pC/N, 10 mV/pC"'
+        to_calibrations, 'calibration: factors such as 250, "250 N/V" or "4.1 pC/N, 10 mV/pC"'
     )
     calibration_uncertainty: float | None = key(
         between(0.0, 0.5), "relative standard uncertainty of the calibration, such as 0.005"

@@ -90,7 +90,7 @@ function recordingField({ name, label, kind, hint, choices }, { onChange, onTypi
   const options = Object.entries({ "": "not known", ...choices }).map(([value, text]) => element("option", { value }, text));
   const isNumber = kind === "number";
   const input = kind === "choice" ? element("select", { id }, ...options)
-    : element("input", { id, type: "text", class: isNumber && "number", inputmode: isNumber && "decimal", "aria-describedby": `${id}.error` });
+    : element("input", { id, type: "text", placeholder: hint, class: isNumber && "number", inputmode: isNumber && "decimal", "aria-describedby": `${id}.error` });
   input.value = state.recording[name] ?? "";
   // A file may be dropped while the field still has the focus.
   input.addEventListener("input", () => { setStated(name, input.value, input); onTyping(); });
@@ -98,7 +98,7 @@ function recordingField({ name, label, kind, hint, choices }, { onChange, onTypi
     const isValue = !isNumber || !input.value.trim() || !Number.isNaN(numberOf(input.value));
     if (isLeft || isValue) onChange();
   });
-  return element("div", { class: "field" }, element("label", { for: id }, label + hint), input, element("p", { class: "error", id: `${id}.error` }));
+  return element("div", { class: "field" }, element("label", { for: id }, label), input, element("p", { class: "error", id: `${id}.error` }));
 }
 
 /** Return the body of a request with the files and fields; throw ServerError for one that the server would refuse. */
@@ -128,9 +128,9 @@ export function showAsks(asks, { onChange, onTyping }) {
     const inputs = fields.map(({ name, label, kind, hint }) => {
       const id = `ask_${name}`;
       const isNumber = kind === "number";
-      const input = element("input", { id, name, type: "text", class: isNumber && "number", inputmode: isNumber && "decimal", value: state.recording[name] ?? values[name] });
+      const input = element("input", { id, name, type: "text", placeholder: hint, class: isNumber && "number", inputmode: isNumber && "decimal", value: state.recording[name] ?? values[name] });
       input.addEventListener("input", () => { setStated(name, input.value, input); onTyping(); });
-      return element("div", { class: "field" }, element("label", { for: id }, label + hint), input);
+      return element("div", { class: "field" }, element("label", { for: id }, label), input);
     });
     return element("div", {}, reason ? element("p", {}, reason) : "", ...inputs);
   });
