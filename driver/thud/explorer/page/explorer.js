@@ -6,21 +6,17 @@ import { firstVariant } from "./first.js";
 import { listenToBall } from "./ball.js";
 import { about, caseValues, invalidField, isCase, state, takeValues } from "./form.js";
 import { addFiles, recording } from "./recording.js";
-import { freeStyle } from "./variants.js";
 import { addPlotMenus, copyText, fileOf } from "./files.js";
-import { RETRY_INTERVAL, current, hideMessage, holdForClicks, kept, once, reconnect, runTask, showError, showMessage } from "./answers.js";
+import { RETRY_INTERVAL, current, hideMessage, holdForClicks, kept, reconnect, showError, showMessage } from "./answers.js";
 import { commit, restoreStored } from "./steps.js";
 import { DOORS, formHandlers, keep, move, openDoor, showAll } from "./doors.js";
 
 async function copyLink() {
   if (hasInvalidField()) return;
-  const variants = kept.list.filter(({ values }) => values).map(({ door, values, title, chosen }) => ({ door, values, title, chosen }));
-  const content = { door: state.door, ball: caseValues("ball"), floor: caseValues("floor"), variants, view: state.view };
-  const address = `${location.origin}/#case=${encodeURIComponent(JSON.stringify(content))}`;
-  const isCopied = await copyText(address, "Copy this link");
-  if (isCopied) flash("link", "Link copied");
-  const hasRecording = kept.list.some(({ values }) => !values) || state.door === "recording";
-  showNote(`The link works in browsers that have opened the full address shown in the terminal, while the server runs. For others print the page to a PDF.${hasRecording ? " It holds the models; recordings are too large for a link." : ""}`);
+  const door = state.door === "floor" ? "floor" : "ball";
+  const text = encodeURIComponent(JSON.stringify({ door, values: caseValues(door) }));
+  if (await copyText(`${location.origin}/#case=${text}`, "Copy this link")) flash("link", "Link copied");
+  showNote("The link holds this case. It works while the server runs, in browsers that have opened the full address shown in the terminal.");
 }
 
 /** Show a note in front of the page until it is closed. */
@@ -38,36 +34,27 @@ function flash(id, text) {
   setTimeout(() => { target.textContent = before; }, 1500);
 }
 
-/** Take over the content of a link, as a step that can be undone; show a message if it is not one of this page. */
-const takeLink = once(async (text) => {
+/** Take over the case of a link, as a step that can be undone; show a message if it has none. */
+function takeLink(text) {
   let content = null;
   try { content = JSON.parse(text); } catch { /* Not a link of this page. */ }
-  const { door, ball, floor, variants, view } = content ?? {};
-  const isVariant = (variant) => ["ball", "floor"].includes(variant?.door) && isCase(variant.values) && [variant.title, variant.chosen].every((text) => ["string", "undefined"].includes(typeof text));
-  if (!DOORS.includes(door) || ![ball, floor].every(isCase) || !Array.isArray(variants) || !variants.every(isVariant)) {
+  const { door, values } = content ?? {};
+  if (!["ball", "floor"].includes(door) || !isCase(values)) {
     showMessage("The link does not contain a case; allowed: links copied from this page");
     return;
   }
   commit();
-  const taken = [];
-  for (const variant of variants) {
-    const answer = await runTask("Computing", "solve", JSON.stringify(variant.values), new AbortController());
-    taken.push({ ...variant, style: freeStyle(taken.filter((other) => (other.door === "floor") === (variant.door === "floor"))), answer });
-  }
-  takeValues(floor);
-  state.door = door;
-  for (const option of Object.keys(state.view)) state.view[option] = view?.[option] === true;
-  kept.list = taken;
+  takeValues(values);
   openDoor(door);
   commit();
-});
+}
 
 /** Take over an address that was entered into this page: its token, case or door. */
-async function onAddress() {
+function onAddress() {
   const parameters = takeFragment();
   hideMessage();
   const door = DOORS.find((name) => parameters.has(name));
-  if (parameters.has("case")) await takeLink(parameters.get("case"));
+  if (parameters.has("case")) takeLink(parameters.get("case"));
   else if (door) openDoor(door);
   else reconnect();
 }
@@ -192,7 +179,7 @@ async function main() {
   else begin(about.start);
   commit();
   addEventListener("hashchange", onAddress);
-  if (link !== null) await takeLink(link);
+  if (link !== null) takeLink(link);
   else if (door && !isRestored) openDoor(door);
   byId("doors").removeEventListener("click", choose);
   if (chosen) openDoor(chosen);

@@ -33,18 +33,6 @@ function svgText(host) {
   }
 }
 
-async function savePng(host, name) {
-  const image = new Image();
-  image.src = `data:image/svg+xml;charset=utf-8,${encodeURIComponent(svgText(host))}`;
-  await image.decode();
-  const canvas = element("canvas", { width: 2 * image.width, height: 2 * image.height });
-  const context = canvas.getContext("2d");
-  context.fillStyle = "#ffffff";
-  context.fillRect(0, 0, canvas.width, canvas.height);
-  context.drawImage(image, 0, 0, canvas.width, canvas.height);
-  canvas.toBlob((blob) => saveFile(`${name}.png`, blob));
-}
-
 /** Return the curves of a plot as comma-separated values, with limits and ends of ranges; no text of it is a formula of a spreadsheet. */
 function csvText({ rows, curves, limits, x, y }) {
   const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
@@ -67,7 +55,7 @@ function csvText({ rows, curves, limits, x, y }) {
 export function addPlotMenus() {
   for (const host of document.querySelectorAll(".plot")) {
     const title = host.parentElement.querySelector("h2").firstChild.textContent.trim();
-    const actions = { SVG: () => saveFile(`${host.id}.svg`, svgText(host), "image/svg+xml"), PNG: () => savePng(host, host.id), CSV: () => saveFile(`${host.id}.csv`, csvText(contentOf(host)), "text/csv") };
+    const actions = { SVG: () => saveFile(`${host.id}.svg`, svgText(host), "image/svg+xml"), CSV: () => saveFile(`${host.id}.csv`, csvText(contentOf(host)), "text/csv") };
     host.parentElement.querySelector(".tools").append(element("details", { class: "menu" }, element("summary", { "aria-label": `Save the plot: ${title}` }, "Save"),
       element("div", {}, ...Object.entries(actions).map(([name, save]) => button(name, save)))));
   }
