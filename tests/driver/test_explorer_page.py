@@ -1187,7 +1187,7 @@ def test_case_is_copied_and_downloaded(browser: Browser, server: Served, tmp_pat
         share(page, f"[data-copy='{name}']")
         sync_api.expect(page.locator(f"[data-copy='{name}']")).to_have_text("Copied")
         texts[name] = page.evaluate("navigator.clipboard.readText()")
-    assert "thud.ModalBall" in texts["case.py"]
+    assert "modal_ball" in texts["case.py"]
     compile(texts["case.py"], "case.py", "exec")
     (tmp_path / "copied.nml").write_text(texts["case.nml"])
     assert thud.read_case(tmp_path / "copied.nml").drop.height == 0.8

@@ -155,7 +155,7 @@ def _judged(status: int, content: bytes) -> str:
 def _hostile_case(server: Explorer, chance: random.Random) -> str:
     groups: Any = {}
     for _ in range(chance.randint(0, 4)):
-        name = chance.choice([*GROUPS, *MODELS, "model", "floor", "room", "moved", "x"])
+        name = chance.choice([*GROUPS, *MODELS, "model", "floor", "room", "x"])
         known = vars(GROUPS[name]()) if name in GROUPS else ("mass",)
         keys = [*known, "name", "drop.height", "é"]
         groups[name] = {chance.choice(keys): chance.choice(VALUES) for _ in range(2)}
@@ -163,7 +163,7 @@ def _hostile_case(server: Explorer, chance: random.Random) -> str:
     if chance.random() < 0.3:
         at = chance.randrange(len(body) + 1)
         body = body[:at] + chance.randbytes(3) + body[at:]
-    downloads = [f"/download/{name}" for name in ("case.nml", "force.csv", "study.toml")]
+    downloads = [f"/download/{name}" for name in ("case.nml", "force.csv", "case.py")]
     return _judged(*server.ask(chance.choice(["/solve", *downloads]), body))
 
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import io
-from dataclasses import fields
+from pprint import pformat
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from thud.base.key import Group
 from thud.case.case import check_case
 from thud.explorer.answer import new_case
 from thud.export.room_sound import listen
@@ -37,30 +36,14 @@ def namelist(values: Values) -> Download:
 
 def script(values: Values) -> Download:
     """Return a Python script that computes the case."""
-    case = new_case(values)
-    check_case(case)
-    arguments = [f"name={case.name!r}"]
-    for field in fields(case):
-        group = getattr(case, field.name)
-        # A case without a model, or with the default one, has no argument.
-        if not isinstance(group, Group):
-            continue
-        stated = _stated(group)
-        if stated or field.name in {"model", "floor", "room"}:
-            listed = ", ".join(f"{name}={value!r}" for name, value in stated.items())
-            arguments.append(f"{field.name}=thud.{type(group).__name__}({listed})")
-    lines = ["import thud", "", "case = thud.Case(", *(f"    {text}," for text in arguments), ")"]
+    check_case(new_case(values))
+    shown = pformat(values, width=90, sort_dicts=False)
+    lines = ["import thud", "", f"case = thud.Case.from_namelist({shown})"]
     lines += ["impact = thud.solve(case)", "print(impact.levels().round(2))"]
     lines += ["print(impact.assess())"]
-    if case.floor and case.room:
+    if {"floor", "room"} <= values.keys():
         lines += ["print(thud.predict_level(impact))"]
     return Download(("\n".join(lines) + "\n").encode())
-
-
-def _stated(group: Group) -> dict[str, object]:
-    """Return the values of a group that differ from their defaults."""
-    defaults = type(group)()
-    return {name: value for name, value in vars(group).items() if value != getattr(defaults, name)}
 
 
 def force(values: Values) -> Download:
