@@ -972,14 +972,6 @@ def test_bare_slab_that_no_change_helps_gets_a_screed(client: TestClient) -> Non
     assert "concrete 180, screed on 6 MN/m3: " in answer["note"]
 
 
-def test_changes_of_a_source_conform_by_their_values(client: TestClient) -> None:
-    answer = last_report(client, "/improve", json={"model": {"name": "modal_ball"}})["answer"]
-    assert answer["none"] == "The source conforms already."
-    modal = {"model": {"name": "modal_ball"}, "modal_ball": {"loss_factor": 0.15}}
-    answer = last_report(client, "/improve", json=modal)["answer"]
-    assert answer["changes"]
-
-
 def test_fit_to_a_recording_returns_its_values(client: TestClient) -> None:
     truth = {"model": {"name": "hunt_crossley"}, "drop": {"height": 0.9}}
     truth |= {"hunt_crossley": {"contact_time": 0.019, "restitution": 0.75}}

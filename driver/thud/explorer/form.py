@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any
 from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS, OPTIONAL_GROUPS, RATINGS, STANDARD_BALL
 from thud.base.units import display_unit, power_of, scaled
 from thud.case.constructions import constructions
-from thud.case.keys import humanize
+from thud.case.keys import find_key, humanize
 from thud.explorer.models import condition_of, is_folded, users_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     from thud.base.key import Group, Key
+    from thud.case.case import Case
 
 # The range of a logarithmic slider is the initial value divided and multiplied by this factor.
 SLIDER_FACTOR = 3.0
@@ -62,6 +63,23 @@ def form() -> list[dict[str, Any]]:
 def fields_by_key() -> dict[tuple[str, str], dict[str, Any]]:
     """Return the fields of the page by group and key."""
     return {(field["group"], field["name"]): field for group in form() for field in group["fields"]}
+
+
+def field_of(case: Case, name: str) -> dict[str, Any]:
+    """Return the field of a key of a case."""
+    key, _ = find_key(name, case)
+    return fields_by_key()[key.group, key.name]
+
+
+def shown(field: Mapping[str, Any], value: float, *, unit: bool = True) -> str:
+    """Return a value of a key in the unit of its field: four digits, and the unit."""
+    return f"{scaled(float(value), -field['power']):.4g} {field['unit'] if unit else ''}".rstrip()
+
+
+def lower(label: str) -> str:
+    """Return a label for the middle of a sentence."""
+    is_name = label.startswith(("Young", "Poisson"))
+    return label if is_name else label[:1].lower() + label[1:]
 
 
 def construction_form() -> list[dict[str, Any]]:

@@ -19,9 +19,9 @@ from thud.base.bridge import progress
 from thud.base.errors import ThudError
 from thud.explorer.answer import answer_case, answer_quickly, new_case
 from thud.explorer.downloads import DOWNLOADS
-from thud.explorer.improve import fit_recording, improve
+from thud.explorer.fits import fit_press, fit_recording
+from thud.explorer.improve import improve
 from thud.explorer.messages import describe_error
-from thud.explorer.press import fit_press
 from thud.explorer.recording import answer_recording, calibration_report
 
 if TYPE_CHECKING:

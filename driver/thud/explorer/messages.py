@@ -9,8 +9,8 @@ from thud.base._schema import KEYS
 from thud.base.errors import InputError
 from thud.base.units import scaled
 from thud.case.keys import humanize
-from thud.explorer.form import fields_by_key
-from thud.explorer.recording_fields import FIELDS, PERCENT, PRESS_FIELDS
+from thud.explorer.form import fields_by_key, lower
+from thud.explorer.recording_fields import FIELDS, PERCENT
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     Field = Mapping[str, Any]
 
 # Fields of recordings by the names of their keys in a configuration.
-_RECORDING_FIELDS = {item.key: item for item in (*FIELDS, *PRESS_FIELDS)}
+_RECORDING_FIELDS = {item.key: item for item in FIELDS}
 # Magnitude of ends of ranges that are open.
 _HUGE = 1e300
 
@@ -63,12 +63,6 @@ def in_words(note: Note) -> str:
     elif name == f"&{note.subject}:":
         name = f"{humanize(note.subject)}:"
     return f"{others.get('place', '')}{name} {text}"
-
-
-def lower(label: str) -> str:
-    """Return a label for the middle of a sentence."""
-    is_name = label.startswith(("Young", "Poisson"))
-    return label if is_name else label[:1].lower() + label[1:]
 
 
 def _out_of_range(note: Note, field: Field) -> str:

@@ -241,6 +241,11 @@ SHOWN = {
 }  # fmt: skip
 
 
+def facts_of(case: Case) -> Facts:
+    """Return the facts of the source model of a case."""
+    return MODEL_FACTS.get(case.model.name if case.model else "", Facts())
+
+
 def model_facts() -> list[dict[str, Any]]:
     """Return the facts of all source models for the page, the most useful model first."""
     names = dict.fromkeys((*MODEL_FACTS, *MODELS))

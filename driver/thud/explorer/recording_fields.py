@@ -121,18 +121,6 @@ def _fields() -> Iterator[Field]:
 
 FIELDS = tuple(_fields())
 
-# Units of the columns of the curve of a press, if their titles state none.
-PRESS_FIELDS = (
-    Field(
-        "press_deflection", "Unit of the deflection", "choice",
-        choices={unit: unit for unit in ("mm", "cm", "m", "um")},
-    ),
-    Field(
-        "press_force", "Unit of the force", "choice",
-        choices={unit: unit for unit in ("N", "kN", "daN", "kgf", "lbf")},
-    ),
-)  # fmt: skip
-
 
 def recording_table(stated: Mapping[str, str]) -> Table:
     """Return the table of a configuration from the texts of fields, by name.

@@ -37,7 +37,7 @@ from thud.explorer.messages import describe_error
 from thud.explorer.models import floor_facts, model_facts
 from thud.explorer.page_file import first_answer, render_page
 from thud.explorer.presets import presets
-from thud.explorer.recording_fields import FIELDS, PRESS_FIELDS, recording_table
+from thud.explorer.recording_fields import FIELDS, recording_table
 
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator, Awaitable, Callable, Mapping, Sequence
@@ -121,7 +121,7 @@ def new_application(
                     ("/measure", _with_files("recording", recording_table), MAX_RECORDING),
                     ("/report", _with_files("report", recording_table), MAX_RECORDING),
                     ("/fit", _with_files("fit", recording_table, has_case=True), MAX_RECORDING),
-                    ("/press", _with_files("press", dict, has_case=True), MAX_RECORDING),
+                    ("/press", _with_files("press", has_case=True), MAX_RECORDING),
                 )
             ),
         ],
@@ -140,7 +140,6 @@ def new_application(
         "form": form(),
         "constructions": construction_form(),
         "recording": list(map(asdict, FIELDS)),
-        "press": list(map(asdict, PRESS_FIELDS)),
         "models": model_facts(),
         "floors": floors,
         "presets": presets(),
@@ -195,12 +194,15 @@ async def _download(request: Request) -> Response:
 
 
 def _with_files(
-    task: str, read: Callable[[Mapping[str, str]], object], *, has_case: bool = False
+    task: str,
+    read: Callable[[Mapping[str, str]], object] | None = None,
+    *,
+    has_case: bool = False,
 ) -> Endpoint:
     """Return an endpoint that sends the reports of a slow task on the files of a form.
 
-    The arguments of the task are the paths of copies of the files, what `read` returns of the other
-    fields of the form, and the values of its case if it has one.
+    The arguments of the task are the paths of copies of the files, what `read`, if any, returns of
+    the other fields of the form, and the values of its case if it has one.
     """
 
     async def answer(request: Request) -> Response:
@@ -211,7 +213,9 @@ def _with_files(
                 files = [value for value in form.getlist("file") if not isinstance(value, str)]
                 fields = {name: text for name, text in form.items() if isinstance(text, str)}
                 case = fields.pop("case", "")
-                arguments = [read({name: text for name, text in fields.items() if text})]
+                arguments: list[object] = []
+                if read:
+                    arguments.append(read({name: text for name, text in fields.items() if text}))
                 if has_case:
                     arguments.append(_groups(request, case))
                 if not files:

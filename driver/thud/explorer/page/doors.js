@@ -4,7 +4,6 @@ import { setFragment } from "./request.js";
 import { hideTip, showAnswer, showFloors, showWarnings } from "./results.js";
 import { showBall } from "./ball.js";
 import { showRatings, showSection } from "./section.js";
-import { closePress } from "./press.js";
 import { caseValues, isTyping, state, takeValues } from "./form.js";
 import { buildDoor, keepStated, recording, recordingBody, showAsks } from "./recording.js";
 import { freeStyle, nameVariants, showVariants } from "./variants.js";
@@ -210,7 +209,6 @@ const fitTo = once(async (title, path, newBody) => {
     showMessage("The fit was not taken over: values have changed since it began");
     return;
   }
-  closePress();
   showFit(answer);
 });
 

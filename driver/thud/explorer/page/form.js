@@ -3,7 +3,7 @@ import { button, byId, capitalize, element, numberOf, numberProblem, scaled } fr
 import { pressInputs } from "./press.js";
 
 /** What the server says of itself, and the case: values that differ from their defaults, the construction that was chosen, what is not known, by model, fields of the recording and those that were stated for an earlier one, names of the user, and what the plots show. */
-export const about = { form: [], constructions: [], models: [], floors: [], presets: [], recording: [], press: [] };
+export const about = { form: [], constructions: [], models: [], floors: [], presets: [], recording: [] };
 export const state = { door: "ball", model: "", floor: "plate", chosen: "", room: true, values: {}, unknowns: {}, recording: {}, earlier: [], titles: {}, view: { thirds: false, differences: false } };
 
 // Digits of a number in its field.
@@ -188,9 +188,8 @@ function ballInputs(handlers) {
   const lines = about.presets.filter((preset, i) => i < 2 || preset === chosen);
   const common = commonGroups();
   const own = findGroup("model", state.model);
-  const [pressButton, pressPanel] = pressInputs(about.press, handlers.onPress);
   return [
-    element("fieldset", {}, element("legend", {}, "Start from"), element("div", { class: "choices" }, ...choices, pressButton), pressPanel,
+    element("fieldset", {}, element("legend", {}, "Start from"), element("div", { class: "choices" }, ...choices), pressInputs(handlers.onPress),
       element("ul", { class: "help" }, ...lines.map(({ title, text }) => element("li", {}, element("b", {}, title), `: ${text}.`))), agingElement(handlers)),
     choiceOf("model", "Model", about.models.map(({ name, title }) => [name, title]), state.model, (name) => { setModel(name); handlers.rebuild(); },
       element("p", { class: "help" }, `${factsOf("model", state.model).purpose}. `, element("em", {}, factsOf("model", state.model).validity))),
