@@ -2,25 +2,18 @@
 
 from __future__ import annotations
 
-import math
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.signal import lfilter
 
-from thud.base._schema import Ball, FiniteElement, HollowSphere, ModalBall, Modes, TwoMass
-from thud.base.bridge import ask
-from thud.case.case import Case, case_text
-from thud.case.keys import number_in, value_in
+from thud.base._schema import FiniteElement, HollowSphere, ModalBall, TwoMass
+from thud.case.keys import number_in
 from thud.explorer.series import TIME_RANGE, thin_out, to_json
 from thud.impact.floor_impact import FloorImpact
-from thud.impact.free_modes import new_modes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from thud.impact.free_modes import FreeModes
     from thud.impact.impact import Impact
 
     Array = NDArray[np.float64]
@@ -31,14 +24,8 @@ MAX_INSTANTS = 30
 MAX_LINES, MAX_RINGS = 33, 5
 # Decimals of positions, mm.
 DECIMALS = 1
-# Free modes of the section of a modal ball.
-MODES = 12
-# Minimum amplitude of the lowest point of an excited mode, relative to its maximum.
-MIN_AMPLITUDE = 1e-6
 # Keys of the elasticity of the ball.
 _ELASTIC = ("youngs_modulus", "poisson_ratio")
-# Number of contact radii for which the forces on the modes are tabulated.
-RADII = 24
 
 
 def motion_of(impact: Impact) -> Answer | None:
@@ -60,13 +47,11 @@ def motion_of(impact: Impact) -> Answer | None:
     }
     if impact.motion is not None:
         return answer | _elements(impact, chosen)
-    if isinstance(model, ModalBall):
-        return answer | _modal_section(impact, chosen)
     ball = impact.case.ball
     deflection = to_json(1e3 * impact.deflection[chosen])
-    if isinstance(model, HollowSphere):
+    if isinstance(model, HollowSphere | ModalBall):
         size = {"radius": 1e3 * ball.outer_radius, "wall": 1e3 * ball.wall_thickness}
-        caption = "Shape that the model assumes: a sphere, flattened by its deflection."
+        caption = "A sphere, flattened by the deflection of the ball."
         return answer | size | {"kind": "sphere", "deflection": deflection, "caption": caption}
     if isinstance(model, TwoMass):
         histories = impact.model_histories
@@ -156,95 +141,6 @@ def _centers(position: Array) -> Array:
     """Return the centers of the elements."""
     pairs = (position[..., 1:, :, :] + position[..., :-1, :, :]) / 2
     return np.asarray((pairs[..., 1:, :] + pairs[..., :-1, :]) / 2)
-
-
-@lru_cache(maxsize=8)
-def _modes(radius: float, wall: float, mass: float, modulus: float, ratio: float) -> FreeModes:
-    # Without the warnings on free modes, which the page does not show.
-    case = Case(ball=Ball(radius, wall, mass, modulus, ratio), model=None, modes=Modes(MODES))
-    return new_modes(case.ball, ask("solve", case=case_text(case)))
-
-
-def _modal_section(impact: Impact, chosen: NDArray[np.intp]) -> Answer:
-    """Return the section of a modal ball: its first free modes under the computed force.
-
-    The force is spread over the computed contact radius as Hertz's pressure. What faster modes add,
-    a local flattening, is replaced by that of the floor.
-    """
-    ball, model = impact.case.ball, impact.case.model
-    assert isinstance(model, ModalBall)  # noqa: S101 - for the type checker
-    modes = _modes(
-        ball.outer_radius,
-        ball.wall_thickness,
-        ball.mass,
-        *(number_in(impact.case, key) for key in _ELASTIC),
-    )
-    pole = modes.shape[:, 0, -1, 1]
-    # Shapes of unit modal mass; a mode whose lowest point rests is not excited.
-    moves = np.abs(pole) > MIN_AMPLITUDE
-    scale = np.sqrt(modes.participation / ball.mass) / np.where(moves, pole, np.inf)
-    shapes = modes.shape * scale[:, None, None, None]
-    loads = _loads(modes.start[:, -1, 0], shapes[:, :, -1, 1], impact, ball.outer_radius)
-    omega = 2 * math.pi * modes.frequency
-    damping = np.minimum(_loss_factors(impact.case, modes.frequency) / 2, 0.99)
-    amplitudes = np.array(
-        [
-            _response(load, w, z, 1 / impact.sample_rate)[chosen]
-            for load, w, z in zip(loads, omega, damping, strict=True)
-        ]
-    )
-    center = ball.outer_radius - impact.deflection[chosen]
-    sections = []
-    lines = thin_out(np.arange(len(modes.start)), MAX_LINES)
-    contact_radius = impact.model_histories["contact_radius_m"][chosen]
-    lower = slice(None, len(lines) // 2)
-    for ring in (-1, 0):
-        start, shape = modes.start[lines, ring], shapes[:, lines, ring]
-        line = start + np.einsum("ki,klc->ilc", amplitudes, shape)
-        line[..., 1] = np.maximum(line[..., 1] + center[:, None], 0.0)
-        if ring == -1:
-            line[:, lower, 1] *= line[:, lower, 0] > contact_radius[:, None]
-        sections.append(_lines(line))
-    caption = f"{MODES} free modes of the ball under the computed force, flattened by the floor."
-    return {"kind": "section", "outer": sections[0], "inner": sections[1], "caption": caption}
-
-
-def _loss_factors(case: Case, frequency: Array) -> Array:
-    """Return the loss factor of the modes of a modal ball."""
-    order = {"constant": 0.0, "rising": 1.0}.get(
-        str(value_in(case, "damping_law")), number_in(case, "fractional_order")
-    )
-    loss, reference = number_in(case, "loss_factor"), number_in(case, "loss_frequency")
-    result: Array = loss * (frequency / reference) ** order
-    return result
-
-
-def _loads(distance: Array, upward: Array, impact: Impact, radius: float) -> Array:
-    """Return the force on each mode, N/sqrt(kg), shape (n_mode, n_sample).
-
-    `distance` is that of the nodes of the outer surface from the axis, from the lowest point on,
-    and `upward` their displacement upwards, shape (n_mode, n_line).
-    """
-    lower = slice(None, int(np.argmax(distance)) + 1)
-    radii = np.linspace(0.0, radius * math.sin(math.pi / 3), RADII)
-    # Midpoints of rings of equal force below Hertz's pressure.
-    fractions = (np.arange(16) + 0.5) / 16
-    rings = np.sqrt(1 - (1 - fractions) ** (2 / 3))
-    points = np.outer(radii, rings)
-    table = [np.interp(points, distance[lower], row[lower]).mean(axis=1) for row in upward]
-    contact = impact.model_histories["contact_radius_m"]
-    return np.array([impact.floor_force * np.interp(contact, radii, row) for row in table])
-
-
-def _response(force: Array, omega: float, damping: float, step: float) -> Array:
-    """Return the amplitude of a mode of unit mass under a force that is constant in each step."""
-    damped = omega * math.sqrt(1 - damping**2)
-    decay = math.exp(-damping * omega * step)
-    cosine, sine = math.cos(damped * step), math.sin(damped * step)
-    sine_part = damping * omega / damped * sine
-    first = (1 - decay * (cosine + sine_part)) / omega**2
-    second = (decay**2 - decay * (cosine - sine_part)) / omega**2
-    return np.asarray(lfilter([0, first, second], [1, -2 * decay * cosine, decay**2], force))
 
 
 def _lines(points: Array) -> list[list[list[float]]]:
