@@ -1,16 +1,12 @@
 // Section of the source on the floor at an instant, and its animation, in step with the plot of the force.
-import { byId, rounded } from "./page.js";
+import { byId } from "./page.js";
 import { setCursor } from "./plot.js";
 
 // Duration of the animation, ms.
 const DURATION = 5000;
-// Maximum displayed displacement of the floor as a fraction of the height of the ball.
-const MAX_DISPLACEMENT = 0.12;
 // Heights of the lower ends of belt and rim of a tyre before the impact, and of its drawing, mm.
 const CARCASS = [45, 125];
 const TYRE_HEIGHT = 180;
-// Colors from the lowest to the highest value (viridis).
-const RAMP = [[68, 1, 84], [59, 82, 139], [33, 145, 140], [94, 201, 98], [253, 231, 37]];
 const isStill = matchMedia("(prefers-reduced-motion: reduce)");
 let motion = null;
 let playing = 0;
@@ -59,7 +55,7 @@ function startBall(once) {
 /** Return a value between two instants: of numbers, or of lists of them. */
 function between(lists, i, part) {
   const mix = (one, other) => (typeof one === "number" ? one + part * (other - one) : one.map((value, k) => mix(value, other[k])));
-  return part ? mix(lists[i], lists[i + 1]) : lists[i];
+  return mix(lists[i], lists[i + 1]);
 }
 
 function renderBall() {
@@ -67,27 +63,21 @@ function renderBall() {
   const context = canvas.getContext("2d");
   const styles = getComputedStyle(document.documentElement);
   const color = (name) => styles.getPropertyValue(name).trim();
-  const { time } = motion;
+  const { time, kind, deflection, outer, inner } = motion;
   const at = time[0] + Number(byId("instant").value) * (time.at(-1) - time[0]);
-  let i = 0;
-  while (i < time.length - 2 && time[i + 1] <= at) i += 1;
-  const part = (at - time[i]) / (time[i + 1] - time[i]);
-  const top = heightOf(motion);
-  const floor = magnification(top) * between(motion.floor, i, part);
+  const next = time.findIndex((instant) => instant > at);
+  const i = (next < 0 ? time.length - 1 : next) - 1;
+  const valueOf = (lists) => between(lists, i, (at - time[i]) / (time[i + 1] - time[i]));
   const ground = canvas.height - 60;
-  const scale = (ground - 20) / top;
-  const place = { x: (r) => canvas.width / 2 + scale * r, y: (z) => ground - scale * (z - floor) };
+  const scale = (ground - 20) / heightOf(motion);
+  const place = { x: (r) => canvas.width / 2 + scale * r, y: (z) => ground - scale * z };
   context.clearRect(0, 0, canvas.width, canvas.height);
   Object.assign(context, { lineWidth: 2, fillStyle: color("--floor"), strokeStyle: color("--quiet"), font: "20px system-ui, sans-serif" });
-  context.fillRect(0, place.y(0), canvas.width, canvas.height);
-  context.beginPath();
-  context.moveTo(0, place.y(0));
-  context.lineTo(canvas.width, place.y(0));
-  context.stroke();
+  context.fillRect(0, ground, canvas.width, canvas.height);
+  context.strokeRect(-2, ground, canvas.width + 4, canvas.height);
   Object.assign(context, { fillStyle: color("--rubber"), strokeStyle: color("--ink") });
-  if (motion.kind === "masses") drawMasses(context, place, between(motion.deflection.belt, i, part), between(motion.deflection.rim, i, part), color("--ink"));
-  else drawSection(context, place, motion.kind === "section" ? [between(motion.outer, i, part), between(motion.inner, i, part)] : flattened(between(motion.deflection, i, part)));
-  if (motion.mesh) drawColors(context, place, between(motion.mesh.nodes, i, part), between(motion.color.value, i, part), color("--ink"));
+  if (kind === "masses") drawMasses(context, place, valueOf(deflection.belt), valueOf(deflection.rim), color("--ink"));
+  else drawSection(context, place, kind === "section" ? [outer, inner].map(valueOf) : flattened(valueOf(deflection)));
   const text = `${at.toFixed(1)} ms`;
   byId("instant_text").textContent = text;
   byId("instant").setAttribute("aria-valuetext", text);
@@ -112,38 +102,6 @@ function drawSection(context, { x, y }, lines) {
   context.stroke();
 }
 
-/** Draw the elements in colors of their values, and the scale. */
-function drawColors(context, { x, y }, nodes, values, ink) {
-  const most = Math.max(...motion.color.value.flat(2));
-  for (const side of [1, -1]) {
-    values.forEach((row, i) => row.forEach((value, j) => {
-      context.beginPath();
-      for (const [r, z] of [nodes[i][j], nodes[i][j + 1], nodes[i + 1][j + 1], nodes[i + 1][j]]) context.lineTo(x(side * r), y(z));
-      context.closePath();
-      context.fillStyle = colorAt(value / most);
-      context.strokeStyle = context.fillStyle;
-      context.lineWidth = 0.7;
-      context.fill();
-      context.stroke();
-    }));
-  }
-  const [left, top, height] = [context.canvas.width - 110, 30, 160];
-  for (let k = 0; k < height; k += 1) {
-    context.fillStyle = colorAt(1 - k / height);
-    context.fillRect(left, top + k, 18, 1.5);
-  }
-  context.fillStyle = ink;
-  context.fillText(rounded(Number(most.toPrecision(2)), motion.color.unit), left + 26, top + 14);
-  context.fillText("0", left + 26, top + height);
-}
-
-/** Return the color of a fraction of the scale. */
-function colorAt(fraction) {
-  const at = Math.min(1, Math.max(0, fraction)) * (RAMP.length - 1);
-  const i = Math.min(RAMP.length - 2, Math.floor(at));
-  return `rgb(${RAMP[i].map((value, k) => Math.round(value + (at - i) * (RAMP[i + 1][k] - value))).join(" ")})`;
-}
-
 /** Draw belt and rim of a tyre, and the springs below them. */
 function drawMasses(context, { x, y }, belt, rim, ink) {
   const [beltHeight, rimHeight] = [CARCASS[0] - belt, CARCASS[1] - rim];
@@ -164,15 +122,6 @@ function drawMasses(context, { x, y }, belt, rim, ink) {
     context.fillText(name, x(-8), y(z + height / 2) + 6);
     context.fillStyle = fill;
   }
-}
-
-/** Return the round factor by which the displacement of the floor is magnified; `top` is the height of the ball. */
-function magnification(top) {
-  const maximum = Math.max(...motion.floor);
-  if (!(maximum > 0)) return 1;
-  const limit = (MAX_DISPLACEMENT * top) / maximum;
-  const power = 10 ** Math.floor(Math.log10(limit));
-  return Math.max(1, power * [5, 2, 1].find((factor) => factor * power <= limit));
 }
 
 /** Return the outer and inner surface of a hollow sphere, flattened by the floor and the wall on it. */
