@@ -120,8 +120,7 @@ def test_keys_of_conditions_have_no_effect_without_their_choice() -> None:
         owner, (other, *choices) = key.owner, key.needs
         (switch,) = (entry for entry in KEYS if entry.owner == owner and entry.name == other)
         assert set(choices) <= set(switch.choices)
-        field = next(f for (_, n), f in FIELDS.items() if n == key.name and f["condition"])
-        assert field["condition"]["values"]
+        assert FIELDS[key.group, key.name]["condition"] == key.needs
         value: Any = 91.0 if key.name == "loss_frequency" else 0.37
         value = [0.2] if key.kind == "list" else value
         for choice in switch.choices:
@@ -268,12 +267,12 @@ TOO_NARROW = (
         ),
         (
             {"floor": {"name": "plate"}, "plate": {"thickness": 5.0}},
-            "Thickness = 5000 mm is not allowed; allowed: 1 to 2000 mm",
+            "Thickness = 5000 mm is not allowed; allowed: at least 1 mm and at most 2000 mm",
             "plate.thickness",
         ),
         (
             {"sampling": {"sample_rate": 1000.0}},
-            "Sample rate = 1 kHz is not allowed; allowed: 2 to 10000 kHz",
+            "Sample rate = 1 kHz is not allowed; allowed: at least 2 kHz and at most 10000 kHz",
             "sampling.sample_rate",
         ),
         (
@@ -283,7 +282,7 @@ TOO_NARROW = (
         ),
         (
             {"sampling": {"substeps": 0}},
-            "Substeps = 0 is not allowed; allowed: 1 to 10000, whole",
+            "Substeps = 0 is not allowed; allowed: at least 1 and at most 10000, whole",
             "sampling.substeps",
         ),
     ],
@@ -293,16 +292,6 @@ def test_errors_speak_the_label_and_the_unit_of_the_field(
 ) -> None:
     error = error_of({"model": {"name": "hollow_sphere"}, **values})
     assert error == {"error": message, "field": field}
-
-
-@pytest.mark.parametrize("wall", [1e-12, 1e-9, 1e-3])
-def test_wall_denser_than_any_material_is_refused(wall: float) -> None:
-    values = {"model": {"name": "modal_ball"}, "ball": {"wall_thickness": wall}}
-    error = error_of(values)
-    assert error["field"] == "ball.wall_thickness"
-    assert error["error"].startswith(f"Wall thickness = {wall!r} is too thin: the wall has ")
-    # A tyre has no such wall.
-    new_case(values | {"model": {"name": "two_mass"}})
 
 
 @pytest.mark.parametrize("name", FLOORS)

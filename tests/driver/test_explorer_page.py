@@ -347,16 +347,11 @@ def test_results_of_other_values_are_dimmed(browser: Browser, server: Served) ->
     sync_api.expect(page.locator("#verdict")).to_contain_text("drop height")
 
 
-@pytest.mark.parametrize(
-    ("value", "message"),
-    [("200", "Wall thickness = 200 mm is not allowed"), ("1e-6", "kg/m")],
-)
-def test_bad_value_is_named_at_its_field(
-    browser: Browser, server: Served, value: str, message: str
-) -> None:
+def test_bad_value_is_named_at_its_field(browser: Browser, server: Served) -> None:
     page = new_page(browser, server[0])
     wall = field(page, "ball.wall_thickness")
-    fill(page, "ball.wall_thickness", value)
+    fill(page, "ball.wall_thickness", "200")
+    message = "Wall thickness = 200 mm is not allowed"
     sync_api.expect(page.locator("#message")).to_contain_text(message)
     sync_api.expect(field(page, "ball.wall_thickness.error")).to_contain_text(message)
     sync_api.expect(wall).to_have_attribute("aria-invalid", "true")
@@ -439,13 +434,6 @@ def test_help_on_a_phone_hides_no_row_beside_its_owner(browser: Browser, server:
         rows[at].focus()
         top, _ = field(page, f"ball.{('wall_thickness', 'mass')[at]}.help").evaluate(box)
         assert max(row.evaluate(box)[1] for row in rows) < top
-    terms = page.locator("#criteria .term")
-    for at in (1, terms.count() - 2):
-        terms.nth(at).focus()
-        tip = page.locator("#tip").evaluate(box)
-        for row in (at - 1, at, at + 1):
-            top, bottom = terms.nth(row).evaluate(box)
-            assert bottom < tip[0] or top > tip[1]
     # Enter on a value that was asked for goes on to the next.
     open_door(page, "recording")
     page.locator("#file").set_input_files(RECORDING)
@@ -480,13 +468,6 @@ def test_changed_construction_is_named_as_changed(browser: Browser, server: Serv
     sync_api.expect(subject).to_have_text("Concrete 180, slab changed to 190 mm, T 0.8 s ")
 
 
-def test_slider_of_a_standard_ball_is_not_at_its_end(browser: Browser, server: Served) -> None:
-    page = new_page(browser, server[0])
-    page.locator("[id='modal_ball.loss_factor'] + input").focus()
-    page.keyboard.press("End")
-    sync_api.expect(field(page, "modal_ball.loss_factor")).to_have_value("1.88")
-
-
 def test_arrow_keys_move_by_round_steps(browser: Browser, server: Served) -> None:
     page = new_page(browser, server[0])
     wall = field(page, "ball.wall_thickness")
@@ -505,10 +486,13 @@ def test_arrow_keys_move_by_round_steps(browser: Browser, server: Served) -> Non
 
 def test_slider_keys_reach_the_ends(browser: Browser, server: Served) -> None:
     page = new_page(browser, server[0])
-    page.locator("[id='drop.height'] + input").focus()
-    page.keyboard.press("End")
+    ends = {"modal_ball.loss_factor": ("0.11", "0.93"), "drop.height": ("0.34", "3")}
+    for key, values in ends.items():
+        page.locator(f"[id='{key}'] + input").focus()
+        for name, value in zip(("Home", "End"), values, strict=True):
+            page.keyboard.press(name)
+            sync_api.expect(field(page, key)).to_have_value(value)
     settle(page)
-    sync_api.expect(field(page, "drop.height")).to_have_value("3")
     sync_api.expect(page.locator("#criteria tbody tr").first).to_contain_text("high")
 
 
@@ -586,29 +570,13 @@ def test_recordings_and_models_are_compared_and_fitted(browser: Browser, server:
     assert len(names_of(page)) == 2
 
 
-def test_aging_is_a_percentage_of_the_modulus(browser: Browser, server: Served) -> None:
+def test_presets_say_which_ball_to_use(browser: Browser, server: Served) -> None:
     page = new_page(browser, server[0])
-    # The lines say which of the two standard balls to use.
     lines = page.locator("#inputs fieldset").first.locator("li")
     sync_api.expect(lines).to_have_text([re.compile("Use it by default"), re.compile("A check at")])
     page.locator("#preset_aged_ball").click()
-    sync_api.expect(field(page, "aging.percent")).to_have_value("20")
-    page.locator("#preset_standard_ball").click()
-    sync_api.expect(field(page, "aging.percent")).to_have_value("0")
-    fill(page, "aging.percent", "30")
-    settle(page)
-    sync_api.expect(field(page, "ball.youngs_modulus")).to_have_value("2.028")
-    assert value_of(page, "63 Hz") > "32.5"
-    fill(page, "ball.youngs_modulus", "1.716")
-    sync_api.expect(field(page, "aging.percent")).to_have_value("10")
-    # Other changes leave it.
-    fill(page, "ball.wall_thickness", "30")
-    sync_api.expect(field(page, "aging.percent")).to_have_value("10")
-    # The study varies the modulus, the key of the case.
-    moved = page.evaluate("Object.keys(state.moved)")
-    assert moved[0] == "ball.youngs_modulus"
-    page.locator("#preset_tyre").click()
-    sync_api.expect(field(page, "aging.percent")).to_have_count(0)
+    sync_api.expect(lines).to_have_count(3)
+    sync_api.expect(field(page, "ball.youngs_modulus")).to_have_value("2.472")
 
 
 def test_press_curve_sets_the_modulus_of_the_ball(browser: Browser, server: Served) -> None:
@@ -1241,13 +1209,9 @@ def test_motion_waits_for_those_who_want_less_of_it(browser: Browser, server: Se
 def test_criteria_explain_themselves(browser: Browser, server: Served) -> None:
     page = new_page(browser, server[0])
     term = page.locator(".term", has_text="Contact time")
-    for show in (term.focus, term.hover):
-        show()
-        tip = page.locator("#tip")
-        for text in ("Time from first touch", "Limits:", "Standard: JIS A 1418-2"):
-            sync_api.expect(tip).to_contain_text(text)
-        page.keyboard.press("Escape")
-        sync_api.expect(tip).to_be_hidden()
+    term.locator("summary").press("Enter")
+    for text in ("Time from first touch", "Limits:", "Standard: JIS A 1418-2"):
+        sync_api.expect(term.get_by_text(text)).to_be_visible()
 
 
 def test_keyboard_alone_opens_all_doors(browser: Browser, server: Served) -> None:

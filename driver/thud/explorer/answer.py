@@ -19,7 +19,6 @@ from thud.explorer.criteria import (
 )
 from thud.explorer.floor import floor_answer, room_answer, room_headline, section
 from thud.explorer.messages import in_words
-from thud.explorer.models import MODEL_FACTS
 from thud.explorer.motion import motion_of
 from thud.explorer.series import curve, to_json
 from thud.floors.prediction import predict_level
@@ -44,8 +43,6 @@ SNAPSHOT_INTERVAL = 1e-3
 MAX_SAMPLES = 200_000
 # Peaks of the force on the floor and of the elastic force.
 PEAKS = "peak_force", "peak_elastic_force"
-# Maximum density of a wall, kg/m3: that of the densest metal, osmium.
-MAX_DENSITY = 22_600.0
 
 
 def new_case(values: Mapping[str, Mapping[str, object]]) -> Case:
@@ -59,31 +56,11 @@ def new_case(values: Mapping[str, Mapping[str, object]]) -> Case:
         if group not in used:
             problem = f"{humanize(group)}: does nothing with this model and floor"
             refuse(problem, ", ".join(map(humanize, used)), subject=group)
-    _require_density(case)
     samples = case.sampling.sample_rate * case.sampling.duration
     if samples > MAX_SAMPLES:
         problem = f"{samples:g} samples are too many for the page"
         refuse(problem, f"up to {MAX_SAMPLES}", subject="sampling.duration")
     return case
-
-
-def _require_density(case: Case) -> None:
-    """Raise InputError if the wall of a ball is denser than any material."""
-    ball, facts = case.ball, MODEL_FACTS.get(case.model.name if case.model else "")
-    numbers = (ball.outer_radius, ball.wall_thickness, ball.mass)
-    is_number = all(type(number) in {int, float} and number > 0 for number in numbers)
-    if (facts and "wall_thickness" in facts.unused) or not is_number:
-        return
-    radius, wall, mass = numbers
-    volume = 4 / 3 * math.pi * (radius**3 - max(radius - wall, 0.0) ** 3)
-    if volume <= 0 or mass / volume > MAX_DENSITY:
-        density = f"{mass / volume:.2g} kg/m3" if volume > 0 else "an infinite density"
-        refuse(
-            f"= {wall!r} is too thin: the wall has {density}",
-            f"a thicker wall or less mass, up to {MAX_DENSITY:g} kg/m3",
-            name="&ball: wall_thickness",
-            subject="ball.wall_thickness",
-        )
 
 
 def answer_quickly(case: Case) -> Answer | None:
@@ -110,7 +87,7 @@ def answer_case(case: Case) -> Answer:
         answer["numbers"].append(["numerical error of an octave up to", error, "dB"])
     answer["headline"] = model_headline(assessed)
     on_floor = impact.on_floor
-    answer["motion"] = motion_of(impact) if case.floor is None else None
+    answer["motion"] = None if case.floor else motion_of(impact)
     answer["section"] = section(case)
     answer["floor"] = None if on_floor is None else floor_answer(impact, on_floor)
     if case.room is not None and case.floor is not None:

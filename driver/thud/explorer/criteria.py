@@ -130,40 +130,26 @@ def _joined(names: Sequence[str]) -> str:
 
 
 def _closest(verdict: Verdict) -> str:
-    """Return the octave level that is closest to a limit, as a sentence."""
-    octaves = [entry for entry in verdict.criteria if entry.unit == "dB"]
-    closest = min(octaves, key=lambda entry: entry.margin)
+    """Return the level that is closest to one of its limits, and its distance."""
+    levels = (entry for entry in verdict.criteria if entry.unit == "dB")
+    closest = min(levels, key=lambda entry: entry.margin)
     return f"Closest to a limit: {closest.quantity.title}, {closest.margin:.2f} dB."
 
 
 def _cause(criterion: Criterion, shown: Mapping[str, str]) -> str:
     """Return name, value and limit of a criterion that is not met or not decided."""
-    quantity = criterion.quantity
-    value, expanded = criterion.value, criterion.estimate.expanded
+    quantity, value, expanded = criterion.quantity, criterion.value, criterion.estimate.expanded
+    text = f"{quantity.title} {quantity.show(value)} {quantity.display_unit}".rstrip()
     if criterion.conforms == VERDICTS[1]:
         is_low = value < criterion.lower
-        limit = criterion.lower if is_low else criterion.upper
-        word = "below" if is_low else "above"
-        text = _shown(criterion, value)
-        # A value close to its limit has all decimals.
-        if _number(criterion, value) == _number(criterion, limit):
-            text = f"{quantity.show(value)} {quantity.display_unit}".rstrip()
-        text = shown.get(criterion.name, text)
-        return f"{quantity.title} {text}, {word} {limit * quantity.display_scale:g}"
+        limit = (criterion.lower if is_low else criterion.upper) * quantity.display_scale
+        if criterion.name in shown:
+            text = f"{quantity.title} {shown[criterion.name]}"
+        return f"{text}, {'below' if is_low else 'above'} {limit:g}"
     if criterion.conforms_if_stated != criterion.conforms:
-        missing = " and ".join(criterion.estimate.not_stated)
-        return f"{quantity.title} {_shown(criterion, value)}, uncertainty of {missing} not stated"
+        return f"{text}, uncertainty of {' and '.join(criterion.estimate.not_stated)} not stated"
     if not math.isfinite(expanded):
-        return f"{quantity.title} {_shown(criterion, value)}, uncertainty not known"
-    low, high = _number(criterion, value - expanded), _shown(criterion, value + expanded)
-    return f"{quantity.title} {low} to {high}, limits {criterion.shown_limits}"
-
-
-def _number(criterion: Criterion, value: float) -> str:
-    quantity = criterion.quantity
-    digits = max(quantity.decimals - 1, 1) if quantity.decimals else 0
-    return f"{value * quantity.display_scale:z.{digits}f}"
-
-
-def _shown(criterion: Criterion, value: float) -> str:
-    return f"{_number(criterion, value)} {criterion.quantity.display_unit}".rstrip()
+        return f"{text}, uncertainty not known"
+    low, high = (quantity.show(end) for end in (value - expanded, value + expanded))
+    text = f"{quantity.title} {low} to {high} {quantity.display_unit}".rstrip()
+    return f"{text}, limits {criterion.shown_limits}"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import fields
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -12,28 +11,21 @@ from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS, OPTIONAL_GROUPS, RAT
 from thud.base.units import display_unit, power_of, scaled
 from thud.case.constructions import constructions
 from thud.case.keys import find_key, humanize
-from thud.explorer.models import condition_of, is_folded, users_of
+from thud.explorer.models import is_folded, users_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Mapping
 
     from thud.base.key import Group, Key
     from thud.case.case import Case
 
-# The range of a logarithmic slider is the initial value divided and multiplied by this factor.
-SLIDER_FACTOR = 3.0
-# The range of a linear slider is the allowed range, if that is positive, at most MAX_LENGTH long,
-# and the initial value is not in its lowest fraction MIN_FRACTION.
-MAX_LENGTH, MIN_FRACTION = 3.0, 0.1
-# Fraction of the allowed range that a linear slider omits at both ends.
-INSET = 0.01
+# A slider goes from the default divided by this factor to its multiple, or from 0, and ends before
+# a limit by a fraction of the distance.
+SLIDER_FACTOR, INSET = 3.0, 0.01
 # Number of steps from zero to a value, at least.
 STEPS = 15
 # Steps of fields whose default is 0, by the unit of the key.
-STEPS_OF_UNITS = {
-    "m": 0.1, "m3": 1.0, "dB": 1.0, "kg/m2": 1.0, "s": 0.001, "s/m": 0.01, "Pa": 1000.0,
-    "Hz": 100.0,
-}  # fmt: skip
+STEPS_OF_UNITS = {"m": 0.1, "dB": 1.0}
 _SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 # Groups of keys that are not on the page.
 OMITTED_GROUPS = ("case", "modes", "compression", "output")
@@ -44,19 +36,21 @@ def form() -> list[dict[str, Any]]:
 
     A group has part (``"model"``, ``"floor"``, ``"room"`` or its name), name, title and fields. A
     field has group and name of its key, label, kind, help, choices, default, the models that use it
-    (None: all), whether it is advanced, and the choice with which it has an effect (None: always).
-    A field of a number also has a unit, the power of ten that converts it to the unit of the key,
-    limits of the allowed range in its unit (None: open), a round step, and a slider.
+    (None: all), whether it is advanced, and a key of its group of fields with the choices with
+    which it has an effect (empty: always). A field of a number also has a unit, the power of ten
+    that converts it to the unit of the key, limits of the allowed range in its unit (None: open), a
+    round step (None: of an unknown size), and a slider.
     """
-    groups = [
-        _group(name, name, kind(), [key for key in KEYS if key.group == name and not key.owner])
-        for name, kind in GROUPS.items()
-        if name not in OMITTED_GROUPS
+    return [
+        *(
+            _group(name, name, kind())
+            for name, kind in GROUPS.items()
+            if name not in OMITTED_GROUPS
+        ),
+        *(_group("model", name, kind()) for name, kind in MODELS.items()),
+        *(_group("floor", name, kind()) for name, kind in FLOORS.items()),
+        _group("room", "room", OPTIONAL_GROUPS["room"]()),
     ]
-    models = [_options("model", name, kind) for name, kind in MODELS.items()]
-    floors = [_options("floor", name, kind) for name, kind in FLOORS.items()]
-    room = _options("room", "room", OPTIONAL_GROUPS["room"])
-    return [*groups, *models, *floors, room]
 
 
 @lru_cache(maxsize=1)
@@ -71,9 +65,10 @@ def field_of(case: Case, name: str) -> dict[str, Any]:
     return fields_by_key()[key.group, key.name]
 
 
-def shown(field: Mapping[str, Any], value: float, *, unit: bool = True) -> str:
-    """Return a value of a key in the unit of its field: four digits, and the unit."""
-    return f"{scaled(float(value), -field['power']):.4g} {field['unit'] if unit else ''}".rstrip()
+def shown(field: Mapping[str, Any], value: float, digits: int = 4, *, unit: bool = True) -> str:
+    """Return a value of a key in the unit of its field: its digits, and the unit."""
+    number = f"{scaled(float(value), -field['power']):.{digits}g}"
+    return f"{number} {field['unit'] if unit else ''}".rstrip()
 
 
 def lower(label: str) -> str:
@@ -95,9 +90,7 @@ def construction_form() -> list[dict[str, Any]]:
             "text": f"{entry.section}. {entry.note}".rstrip(),
             "floor": entry.floor.name,
             "keys": {
-                key: list(value) if isinstance(value, tuple) else value
-                for key, value in vars(entry.floor).items()
-                if key in entry.sources
+                key: value for key, value in vars(entry.floor).items() if key in entry.sources
             },
             "room": entry.room,
             "sources": entry.sources,
@@ -106,24 +99,16 @@ def construction_form() -> list[dict[str, Any]]:
     ]
 
 
-def _options(part: str, name: str, kind: type[Group]) -> dict[str, Any]:
-    """Return the fields of the options of a model, a floor or the room."""
-    names = [option.name for option in fields(kind)]  # type: ignore[arg-type]
-    keys = [key for key in KEYS if key.owner == name and key.name in names]
-    return _group(part, name, kind(), keys)
-
-
-def _group(part: str, name: str, values: Group, keys: Iterable[Key]) -> dict[str, Any]:
-    """Return a group of fields."""
-    used = [key for key in keys if key.group not in OMITTED_GROUPS]
-    shown = [_field(key, _default(key, values)) for key in used]
+def _group(part: str, name: str, values: Group) -> dict[str, Any]:
+    """Return a group of fields: those of a group of every case, or of the options of an owner."""
+    owner = name if part in {"model", "floor", "room"} else ""
+    shown = [
+        _field(key, getattr(values, key.name))
+        for key in KEYS
+        if key.owner == owner and key.group not in OMITTED_GROUPS and hasattr(values, key.name)
+        if owner or key.group == name
+    ]
     return {"part": part, "name": name, "title": _title(name), "fields": shown}
-
-
-def _default(key: Key, values: Group) -> object:
-    """Return the default of a key: of a calibrated one that of the first model that has it."""
-    value = getattr(values, key.name)
-    return next(iter(_standard(key).values())) if value is None else value
 
 
 def _standard(key: Key) -> dict[str, float]:
@@ -135,50 +120,57 @@ def _standard(key: Key) -> dict[str, float]:
     }
 
 
-def _field(key: Key, default: object) -> dict[str, Any]:
-    """Return the field of a key."""
-    label, meaning = _title(key.name), _capitalize(humanize(key.meaning))
-    field = {
+def _field(key: Key, value: object) -> dict[str, Any]:
+    """Return the field of a key, with its default: of the first model if it is calibrated."""
+    meaning, standard = _capitalize(humanize(key.meaning)), _standard(key)
+    default = next(iter(standard.values())) if value is None else value
+    field: dict[str, Any] = {
         "group": key.group,
         "name": key.name,
-        "label": label,
+        "label": _title(key.name),
         "kind": key.kind,
         "help": meaning,
         "choices": {choice: humanize(choice) for choice in key.choices},
-        "default": list(default) if isinstance(default, tuple) else default,
-        "standard": _standard(key),
+        "default": default,
+        "standard": standard,
         "unit": _typeset(key.unit),
-        "si_unit": key.unit,
         "power": 0,
         "models": users_of(key),
         "advanced": is_folded(key),
-        "condition": condition_of(key),
+        "condition": key.needs,
     }
     if (key.group, key.name) == ("room", "rating"):
         # The bands stand in the help: the column has no room for both.
         standards = {name: text.partition("(")[2].rstrip(")") for name, text in RATINGS.items()}
         field |= {"choices": standards, "help": "; ".join(RATINGS.values())}
     if key.kind in {"real", "whole"} and isinstance(default, int | float):
-        unit = _unit(key, default)
-        power = power_of(unit or "1", key.unit, key.name)
-        suffix = "" if isinstance(key.upper, str) else f" {_typeset(unit)}"
-        allowed = f"allowed: {_limit(key.lower, power)} to {_limit(key.upper, power)}{suffix}"
-        value, lower, upper = (_converted(x, power) for x in (default, key.lower, key.upper))
-        ends = lower, upper, MAX_LENGTH if default else scaled(MAX_LENGTH, -power)
-        is_whole = key.kind == "whole"
-        field |= {
-            "unit": _typeset(unit),
-            "power": power,
-            "lower": lower,
-            "upper": upper,
-            "help": f"{'' if meaning == label else meaning + '; '}{allowed.rstrip()}",
-            "step": 1 if is_whole else _step(key.unit, value or 0.0, *ends),
-            "slider": _slider(value or 0.0, *ends, whole=is_whole),
-        }
-        if zero := re.search(r"\b0: ([^;,]+)", meaning):
-            # Such a zero, as "none", is an empty field without a slider.
-            field["zero"] = None if field["slider"] else zero[1]
+        field |= _number(key, default, meaning)
     return field
+
+
+def _number(key: Key, default: float, meaning: str) -> dict[str, Any]:
+    """Return what the field of a number has besides."""
+    unit = _unit(key, default)
+    power = power_of(unit or "1", key.unit, key.name)
+    ends = f"{_limit(key.lower, power)} to {_limit(key.upper, power)}"
+    allowed = ends if isinstance(key.upper, str) else f"{ends} {_typeset(unit)}".rstrip()
+    value, lower, upper = (_converted(x, power) for x in (default, key.lower, key.upper))
+    is_whole = key.kind == "whole"
+    slider = _slider(value or 0.0, lower, upper, power)
+    zero = re.search(r"\b0: ([^;,]+)", meaning)
+    size = abs(value or 0.0) or (slider["ends"][1] if slider else 0.0)
+    step = 10.0 ** math.floor(math.log10(size / STEPS)) if size else STEPS_OF_UNITS.get(key.unit)
+    return {
+        "unit": _typeset(unit),
+        "power": power,
+        "lower": lower,
+        "upper": upper,
+        "help": f"{'' if meaning == _title(key.name) else meaning + '; '}allowed: {allowed}",
+        "step": 1 if is_whole else step,
+        "slider": slider,
+        # Such a zero, as "none", is an empty field without a slider.
+        "zero": zero[1] if zero and not slider else None,
+    }
 
 
 def _title(name: str) -> str:
@@ -214,34 +206,22 @@ def _unit(key: Key, default: float) -> str:
     if key.unit == "s":
         return key.unit
     # Lengths that may be 0 have the unit of their maximum.
-    size = (
-        key.upper if key.unit == "m" and not default and not isinstance(key.upper, str) else default
-    )
-    return display_unit(key.unit, size)[0]
-
-
-def _step(
-    unit: str, value: float, lower: float | None, upper: float | None, max_length: float
-) -> float | None:
-    """Return a power of ten by which arrow keys change a value; None if no size is known."""
-    size = abs(value)
-    if not size and lower is not None and upper is not None and upper - lower <= max_length:
-        size = upper - lower
-    return 10.0 ** math.floor(math.log10(size / STEPS)) if size else STEPS_OF_UNITS.get(unit)
+    if key.unit == "m" and not default and not isinstance(key.upper, str):
+        default = key.upper
+    return display_unit(key.unit, default)[0]
 
 
 def _slider(
-    value: float, lower: float | None, upper: float | None, max_length: float, *, whole: bool
+    value: float, lower: float | None, upper: float | None, power: int
 ) -> dict[str, Any] | None:
-    """Return ends and scale of a slider around a value; None if there is no range for a slider."""
-    if lower is not None and upper is not None and lower >= 0:
-        length = upper - lower
-        if length <= max_length and (value <= 0 or value >= lower + MIN_FRACTION * length):
-            # The limits may not be allowed values, but the default is.
-            inner = lower + INSET * length, upper - INSET * length
-            return {"ends": [min(value, inner[0]), max(value, inner[1])], "log": False}
+    """Return the ends of a slider around a value; None if there is no range for a slider."""
     if value <= 0:
-        return None
-    low = max(value / SLIDER_FACTOR, -math.inf if lower is None else lower)
-    high = min(value * SLIDER_FACTOR, math.inf if upper is None else upper)
-    return {"ends": [math.ceil(low), math.floor(high)] if whole else [low, high], "log": not whole}
+        # The lowest thickness, loss or fraction.
+        is_short = lower == 0 and upper is not None and scaled(upper, power) <= 1
+        return {"ends": [0, (1 - INSET) * (upper or 0.0)]} if is_short else None
+    low, high = value / SLIDER_FACTOR, value * SLIDER_FACTOR
+    if lower is not None:
+        low = max(low, lower + INSET * (value - lower))
+    if upper is not None:
+        high = min(high, upper - INSET * (upper - value))
+    return {"ends": [low, high]}

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from thud.base._schema import KEYS
 from thud.base.errors import InputError
-from thud.base.units import scaled
 from thud.case.keys import humanize
-from thud.explorer.form import fields_by_key, lower
+from thud.explorer.form import fields_by_key, lower, shown
 from thud.explorer.recording_fields import FIELDS, PERCENT
 
 if TYPE_CHECKING:
@@ -68,31 +67,16 @@ def in_words(note: Note) -> str:
 def _out_of_range(note: Note, field: Field) -> str:
     """Return what is said of a value outside its range, in the unit of its field."""
     key = next(key for key in KEYS if (key.group, key.name) == (field["group"], field["name"]))
-    unit = f" {field['unit']}" if field["unit"] else ""
-    ends = [
-        _end(number, limit, field, word)
-        for number, limit, word in (
-            (note.low, key.lower, "more than" if note.others["low_open"] else "at least"),
-            (note.high, key.upper, "less than" if note.others["high_open"] else "at most"),
-        )
-        if abs(number) < _HUGE
-    ]
-    allowed = " and ".join(ends)
-    is_closed = not (note.others["low_open"] or note.others["high_open"])
-    if is_closed and len(ends) > 1 and not isinstance(key.upper, str):
-        allowed = f"{_scaled(note.low, field)} to {_scaled(note.high, field)}{unit}"
+    ends = []
+    for number, limit, is_open, words in (
+        (note.low, key.lower, note.others["low_open"], ("at least", "more than")),
+        (note.high, key.upper, note.others["high_open"], ("at most", "less than")),
+    ):
+        # A limit may be the value of another field.
+        other = fields_by_key().get((field["group"], str(limit)))
+        label = f"{lower(other['label'])}, " if other else ""
+        if abs(number) < _HUGE:
+            ends.append(f"{words[bool(is_open)]} {label}{shown(field, number, 10)}")
     whole = ", whole" if key.kind == "whole" or key.whole else ""
-    return f"= {_scaled(note.value, field)}{unit} is not allowed; allowed: {allowed}{whole}"
-
-
-def _end(number: float, limit: float | str, field: Field, word: str) -> str:
-    """Return an end of a range in words, with the field whose value it is."""
-    other = fields_by_key().get((field["group"], limit)) if isinstance(limit, str) else None
-    label = f"{lower(other['label'])}, " if other else ""
-    unit = f" {field['unit']}" if field["unit"] else ""
-    return f"{word} {label}{_scaled(number, field)}{unit}"
-
-
-def _scaled(number: float, field: Field) -> str:
-    """Return a number in the unit of a field."""
-    return f"{scaled(float(number), -field['power']):.10g}"
+    allowed = f"{' and '.join(ends)}{whole}"
+    return f"= {shown(field, note.value, 10)} is not allowed; allowed: {allowed}"

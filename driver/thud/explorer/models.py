@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import f90nml
 
-from thud.base._schema import FLOORS, KEYS, MODELS
+from thud.base._schema import FLOORS, MODELS
 from thud.base.files import inputs_folder
 from thud.case.case import Case
 from thud.case.keys import humanize
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable, Mapping
 
     from thud.base.key import Key
 
@@ -41,12 +41,9 @@ class Facts:
         What it is for, and how far its results can be trusted: one line each.
     case : callable or None
         Function that returns the case with whose values the page begins; None: the defaults.
-    unused : tuple of str
-        Keys that all models have, but which have no effect on this one.
-    tuned : tuple of str
-        Parameters of a source that may be changed so that it conforms.
-    fitted : tuple of str
-        Parameters that a recording determines.
+    unused, tuned, fitted : tuple of str
+        Keys of all models without effect on this one; parameters of a source that may be changed so
+        that it conforms; those that a recording determines.
     has_room : bool
         Whether a room below a floor can be predicted.
     """
@@ -61,25 +58,21 @@ class Facts:
     has_room: bool = True
 
     def data(self, name: str) -> dict[str, Any]:
-        """Return the facts of a model or a floor with a name, for the page."""
+        """Return the facts of a model or a floor with a name, for the page.
+
+        Its values are those with which the page begins, if not the defaults, by group and key.
+        """
+        values = changed_values(self.case()) if self.case else {}
+        floor = str(values.get("floor", {}).get("name", ""))
+        own = [floor] if floor else [group for group in values if group != "model"]
         return {
             "name": name,
             "title": self.title or humanize(name).capitalize(),
             "purpose": self.purpose,
             "validity": self.validity,
-            "values": self._values(),
+            "values": {group: values[group] for group in own if group in values},
             "has_room": self.has_room,
         }
-
-    def _values(self) -> Values:
-        """Return the first values of the page that differ from the defaults, by group and key."""
-        if self.case is None:
-            return {}
-        values = changed_values(self.case())
-        if "floor" in values:
-            name = str(values["floor"]["name"])
-            return {name: values.get(name, {})}
-        return {group: keys for group, keys in values.items() if group != "model"}
 
 
 def changed_values(case: Case) -> Values:
@@ -248,14 +241,16 @@ def facts_of(case: Case) -> Facts:
 
 def model_facts() -> list[dict[str, Any]]:
     """Return the facts of all source models for the page, the most useful model first."""
-    names = dict.fromkeys((*MODEL_FACTS, *MODELS))
-    return [MODEL_FACTS.get(name, Facts()).data(name) for name in names]
+    return _facts(MODEL_FACTS, MODELS)
 
 
 def floor_facts() -> list[dict[str, Any]]:
     """Return the facts of all floors for the page."""
-    names = dict.fromkeys((*FLOOR_FACTS, *FLOORS))
-    return [FLOOR_FACTS.get(name, Facts()).data(name) for name in names]
+    return _facts(FLOOR_FACTS, FLOORS)
+
+
+def _facts(stated: Mapping[str, Facts], known: Iterable[str]) -> list[dict[str, Any]]:
+    return [stated.get(name, Facts()).data(name) for name in dict.fromkeys((*stated, *known))]
 
 
 def users_of(key: Key) -> list[str] | None:
@@ -268,12 +263,3 @@ def is_folded(key: Key) -> bool:
     """Return whether most users never change a key."""
     shown = SHOWN.get(key.owner or key.group)
     return shown is not None and key.name not in shown
-
-
-def condition_of(key: Key) -> dict[str, object] | None:
-    """Return the choice with which a key has an effect: group, name and values; None: always."""
-    if not key.needs:
-        return None
-    name, *values = key.needs
-    group = next(item.group for item in KEYS if item.owner == key.owner and item.name == name)
-    return {"group": group, "name": name, "values": values}

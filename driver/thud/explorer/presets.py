@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from thud.base._schema import STANDARD_BALL, Ball, FiniteElement
 from thud.case.case import Case
@@ -18,35 +17,13 @@ if TYPE_CHECKING:
 AGING = 1.2
 
 
-@dataclass(frozen=True)
-class Preset:
-    """Named case of the page.
-
-    Attributes
-    ----------
-    title, text : str
-        Title, and what it is in one line.
-    door : str
-        Part of the page: ``"ball"`` or ``"floor"``.
-    case : callable
-        Function that returns the case.
-    """
+class Preset(NamedTuple):
+    """Named case: title, what it is in one line, door of the page, and function of its case."""
 
     title: str
     text: str
     door: str
     case: Callable[[], Case]
-
-    def data(self, name: str) -> dict[str, Any]:
-        """Return the preset with its name for the page."""
-        values = changed_values(self.case())
-        return {
-            "name": name,
-            "title": self.title,
-            "text": self.text,
-            "door": self.door,
-            "values": values,
-        }
 
 
 def _aged_ball() -> Case:
@@ -69,8 +46,8 @@ PRESETS = {
     ),
     "aged_ball": Preset(
         "Aged ball",
-        "Finite elements with a modulus that aging has raised by a fifth, an assumption: state "
-        "your own below",
+        "Finite elements with a modulus that aging has raised by a fifth, an assumption: "
+        "change the modulus below",
         "ball",
         _aged_ball,
     ),
@@ -109,4 +86,7 @@ PRESETS = {
 
 def presets() -> list[dict[str, Any]]:
     """Return the presets for the page; the first is the case with which it begins."""
-    return [preset.data(name) for name, preset in PRESETS.items()]
+    return [
+        {"name": name, **preset._asdict(), "case": None, "values": changed_values(preset.case())}
+        for name, preset in PRESETS.items()
+    ]

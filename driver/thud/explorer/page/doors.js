@@ -1,7 +1,7 @@
 // The three doors: what each shows, its variants, and the actions on its answer.
 import { byId, button, element, saveFile } from "./page.js";
 import { setFragment } from "./request.js";
-import { hideTip, showAnswer, showFloors, showWarnings } from "./results.js";
+import { showAnswer, showFloors, showWarnings } from "./results.js";
 import { showBall } from "./ball.js";
 import { showRatings, showSection } from "./section.js";
 import { caseValues, isTyping, state, takeValues } from "./form.js";
@@ -55,7 +55,6 @@ function showAnswers() {
   document.body.dataset.door = door;
   document.body.classList.toggle("measured", Boolean(current.recording));
   for (const name of Object.keys(view)) byId(name).checked = view[name];
-  hideTip();
   byId("variants_section").hidden = variants.length < 2;
   byId("keep").hidden = isEmpty;
   byId("next").replaceChildren();

@@ -1,7 +1,6 @@
 // Start of the page: its menu, links, keys and files, and the case with which it begins.
 import { byId, button, element, saveFile } from "./page.js";
 import { ConnectionError, ask, firstAbout, fragment, setFragment, takeFragment } from "./request.js";
-import { hideTip } from "./results.js";
 import { firstVariant } from "./first.js";
 import { listenToBall } from "./ball.js";
 import { about, caseValues, invalidField, isCase, state, takeValues } from "./form.js";
@@ -117,7 +116,7 @@ function listen() {
   for (const target of document.querySelectorAll("[data-file]")) target.addEventListener("click", () => download(target.dataset.file));
   for (const target of document.querySelectorAll("[data-copy]")) target.addEventListener("click", () => download(target.dataset.copy, target));
   addEventListener("keydown", (event) => {
-    if (event.key === "Escape") { hideTip(); for (const menu of document.querySelectorAll(".menu[open]")) { menu.open = false; menu.firstElementChild.focus(); } }
+    if (event.key === "Escape") { for (const menu of document.querySelectorAll(".menu[open]")) { menu.open = false; menu.firstElementChild.focus(); } }
     // A field for text has steps of its own.
     if (!(event.ctrlKey || event.metaKey) || event.target.matches?.("input[type=text], textarea, [contenteditable]")) return;
     const isRedo = event.key === "y" || (event.key.toLowerCase() === "z" && event.shiftKey);

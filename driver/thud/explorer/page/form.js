@@ -25,12 +25,16 @@ export function findField(group, name) {
   return about.form.flatMap(({ fields }) => fields).find((field) => field.group === group && field.name === name);
 }
 
-/** Return whether a field has an effect on the case. */
-function isUsed(field) {
-  if (field.models && !field.models.includes(state.model)) return false;
-  if (!field.condition) return true;
-  const { group, name, values } = field.condition;
-  return values.includes(valueOf(findField(group, name)));
+/** Return the field on whose choice a field depends, if there is one. */
+function switchOf(field) {
+  const { fields } = about.form.find((group) => group.fields.includes(field));
+  return fields.find(({ name }) => name === field.condition[0]);
+}
+
+/** Return whether a field has an effect on a case, by default that of the form. */
+export function isUsed(field, model = state.model, read = valueOf) {
+  const owner = switchOf(field);
+  return field.models?.includes(model) !== false && (!owner || field.condition.includes(read(owner), 1));
 }
 
 const isSame = (one, other) => JSON.stringify(one) === JSON.stringify(other);
@@ -190,38 +194,12 @@ function ballInputs(handlers) {
   const own = findGroup("model", state.model);
   return [
     element("fieldset", {}, element("legend", {}, "Start from"), element("div", { class: "choices" }, ...choices), pressInputs(handlers.onPress),
-      element("ul", { class: "help" }, ...lines.map(({ title, text }) => element("li", {}, element("b", {}, title), `: ${text}.`))), agingElement(handlers)),
+      element("ul", { class: "help" }, ...lines.map(({ title, text }) => element("li", {}, element("b", {}, title), `: ${text}.`)))),
     choiceOf("model", "Model", about.models.map(({ name, title }) => [name, title]), state.model, (name) => { setModel(name); handlers.rebuild(); },
       element("p", { class: "help" }, `${factsOf("model", state.model).purpose}. `, element("em", {}, factsOf("model", state.model).validity))),
     ...[...common.slice(0, 2), own, ...common.slice(2)].map((group) => groupElement(group, handlers)),
     foldedElement([own, ...common], handlers),
   ];
-}
-
-// Range of the slider of aging, %.
-const AGING = { ends: [0, 100], log: false };
-
-/** Return the modulus of the new ball, that of the first preset of the same model, in its own unit; null if there is none. */
-function newModulus() {
-  const field = findField("ball", "youngs_modulus");
-  const preset = isUsed(field) && about.presets.find(({ door, values }) => door === "ball" && values.model.name === state.model);
-  return preset ? preset.values.ball?.youngs_modulus ?? defaultOf(field) : null;
-}
-
-/** Return the percentage by which aging has raised the modulus. */
-const agingOf = (modulus) => Number((100 * (valueOf(findField("ball", "youngs_modulus")) / modulus - 1)).toFixed(1));
-
-/** Return the field of the percentage by which aging has raised the modulus; nothing for models without a named ball. */
-function agingElement(handlers) {
-  const modulus = newModulus();
-  if (modulus === null) return "";
-  const own = findField("ball", "youngs_modulus");
-  const field = { group: "aging", name: "percent", label: "Stiffer by aging", unit: "%", power: 0, default: agingOf(modulus), lower: -90, step: 1, slider: AGING,
-    help: `Change of Young's modulus from that of the new ball, ${Number(scaled(modulus, -own.power).toPrecision(4))} ${own.unit}` };
-  const setModulus = (percent) => {
-    byId("ball.youngs_modulus").send(Number(scaled(modulus * (1 + percent / 100), -own.power).toPrecision(DIGITS)));
-  };
-  return newField(field, numberInput(field, "aging.percent", setModulus, handlers));
 }
 
 function floorInputs(handlers) {
@@ -289,20 +267,16 @@ function foldedElement(groups, handlers, sources = {}) {
 function fieldElement(field, handlers, source) {
   const id = `${field.group}.${field.name}`;
   const onInput = (value) => {
-    const changesFields = about.form.some(({ fields }) => fields.some(({ condition }) => condition?.group === field.group && condition.name === field.name));
+    const changesFields = about.form.some(({ fields }) => fields.some((other) => switchOf(other) === field));
     setValue(field, value);
     byId(`${id}.help`).textContent = helpOf(field);
     if (changesFields) handlers.rebuild();
     else handlers.onChange();
     showChoices();
   };
-  const newInputs = { choice: choiceInput, flag: flagInput, list: listInput, text: textInput }[field.kind] ?? numberInput;
-  return newField(field, newInputs(field, id, onInput, handlers), source);
-}
-
-/** Return a field with label, inputs, help and error. */
-function newField(field, inputs, source) {
-  const [{ label, unit }, [{ id }]] = [field, inputs];
+  const newInputs = { choice: plainInput, flag: plainInput, list: listInput, text: plainInput }[field.kind] ?? numberInput;
+  const inputs = newInputs(field, id, onInput, handlers);
+  const { label, unit } = field;
   for (const input of inputs) input.setAttribute("aria-describedby", `${id}.help ${id}.error`);
   return element("div", { class: "field" }, element("label", { for: id }, unit ? `${label}, ${unit}` : label), ...inputs,
     element("p", { class: "help", id: `${id}.help` }, source ? `${helpOf(field)} Source of the value: ${source}.` : helpOf(field)),
@@ -311,38 +285,25 @@ function newField(field, inputs, source) {
 
 const helpOf = ({ help, kind }) => `${help}.${kind === "list" ? " Blanks or semicolons separate values; 24,5 is 24.5." : ""}`;
 
-/** Show which preset, aging or construction the form has. */
+/** Show which preset or construction the form has. */
 function showChoices() {
   const current = sorted(caseValues("ball"));
   for (const preset of about.presets) byId(`preset_${preset.name}`)?.setAttribute("aria-pressed", String(isSame(sorted(preset.values), current)));
-  const modulus = newModulus();
-  const aging = byId("aging.percent");
-  if (modulus !== null && aging !== document.activeElement) aging?.show(agingOf(modulus));
   if (!byId("construction")) return;
   const construction = findConstruction();
   byId("construction").value = construction?.name ?? "";
   byId("construction_text").textContent = construction?.text ?? "Changed values of a floor.";
 }
 
-function choiceInput(field, id, onInput) {
-  const options = Object.entries(field.choices).map(([value, text]) => element("option", { value }, capitalize(text)));
-  const select = element("select", { id }, ...options);
-  select.value = valueOf(field);
-  select.addEventListener("change", () => onInput(select.value));
-  return [select];
-}
-
-function flagInput(field, id, onInput) {
-  const box = element("input", { id, type: "checkbox" });
-  box.checked = valueOf(field);
-  box.addEventListener("change", () => onInput(box.checked));
-  return [box];
-}
-
-function textInput(field, id, onInput) {
-  const text = element("input", { id, type: "text", value: valueOf(field) });
-  text.addEventListener("change", () => onInput(text.value));
-  return [text];
+/** Return the input of a choice, a flag or a text. */
+function plainInput({ kind, choices, ...field }, id, onInput) {
+  const options = Object.entries(choices).map(([value, text]) => element("option", { value }, capitalize(text)));
+  const input = kind === "choice" ? element("select", { id }, ...options)
+    : element("input", { id, type: kind === "flag" ? "checkbox" : "text" });
+  const property = kind === "flag" ? "checked" : "value";
+  input[property] = valueOf(field);
+  input.addEventListener("change", () => onInput(input[property]));
+  return [input];
 }
 
 /** Call a function when an input is left after typing, with true, and after a pause of typing, with false. */
@@ -420,8 +381,8 @@ function numberInput(field, id, onInput, handlers) {
     return Number.isNaN(entered) ? undefined : entered;
   };
   const { send } = number;
-  const step = field.step ?? (field.kind === "whole" ? 1 : null);
-  const slider = field.slider && step ? sliderInput(field, current, step, send) : null;
+  const { step } = field;
+  const slider = field.slider && step ? sliderInput(field, current, send) : null;
   takeTyping(number, {
     read, isTaken: () => number.value === textOf(current) || read(number.value) === current,
     show: () => { number.value = textOf(current); },
@@ -429,49 +390,34 @@ function numberInput(field, id, onInput, handlers) {
     send: (entered, isLeft) => { if (isLeft) send(entered); else { take(entered); onInput(scaled(entered, field.power)); } },
     problem: (text) => `${field.label}: ${numberProblem(text, field.unit)}`,
   }, handlers);
-  if (step) number.addEventListener("keydown", (event) => moveByKey(event, read(number.value) ?? current, step, field.lower, field.upper, send));
+  number.addEventListener("keydown", (event) => {
+    const steps = { ArrowUp: 1, ArrowDown: -1, PageUp: 10, PageDown: -10 }[event.key];
+    if (!steps || !step || event.altKey || event.ctrlKey || event.metaKey) return;
+    event.preventDefault();
+    // To the next round number.
+    const ratio = (read(number.value) ?? current) / step;
+    const next = rounding((steps > 0 ? Math.floor(ratio + 1e-6) : Math.ceil(ratio - 1e-6)) + steps, step);
+    if (next >= (field.lower ?? -Infinity) && next <= (field.upper ?? Infinity)) send(next);
+  });
   return slider ? [number, slider] : [number];
 }
 
-/** Move a value to the next round number with the arrow keys, ten steps with Page Up and Page Down. */
-function moveByKey(event, value, step, low, high, onMove) {
-  const steps = { ArrowUp: 1, ArrowDown: -1, PageUp: 10, PageDown: -10, ...(event.target.type === "range" ? { ArrowRight: 1, ArrowLeft: -1 } : {}) }[event.key];
-  if (!steps || event.altKey || event.ctrlKey || event.metaKey) return;
-  event.preventDefault();
-  const ratio = value / step;
-  const next = (steps > 0 ? Math.floor(ratio + 1e-6) : Math.ceil(ratio - 1e-6)) + steps;
-  const moved = rounding(next, step);
-  if (moved >= (low ?? -Infinity) && moved <= (high ?? Infinity)) onMove(moved);
-}
-
 /** Return a whole number of steps, a power of ten, without errors of rounding. */
-function rounding(count, step) {
-  return scaled(Math.round(count), Math.round(Math.log10(step)));
-}
+const rounding = (count, step) => scaled(Math.round(count), Math.round(Math.log10(step)));
 
-/** Return a slider on a linear or logarithmic scale with round values; `onMove` is called with the selected value. */
-function sliderInput(field, value, step, onMove) {
-  const [first, last] = field.slider.ends;
+/** Return a slider of round values; `onMove` is called with the selected value. */
+function sliderInput({ slider: { ends }, step, lower, upper, label, unit }, value, onMove) {
   // A model or a construction may have brought a value near the end for the default.
-  const ends = field.slider.log && value > 0 ? [Math.max(Math.min(first, value / 2), field.lower ?? 0), Math.min(Math.max(last, 2 * value), field.upper ?? Infinity)] : [first, last];
-  const [low, high] = [rounding(Math.ceil(ends[0] / step - 1e-6), step), rounding(Math.floor(ends[1] / step + 1e-6), step)];
-  const [toSlider, fromSlider] = field.slider.log && low > 0 ? [Math.log, Math.exp] : [(x) => x, (x) => x];
-  const slider = element("input", { type: "range", "aria-label": field.label, min: toSlider(low), max: toSlider(high), step: "any" });
-  let current = value;
+  const low = Math.min(ends[0], Math.max(value / 2, lower ?? 0));
+  const high = Math.max(ends[1], Math.min(2 * value, upper ?? Infinity));
+  const [min, max] = [Math.ceil(low / step - 1e-6), Math.floor(high / step + 1e-6)].map((count) => rounding(count, step));
+  const slider = element("input", { type: "range", "aria-label": label, min, max, step });
   slider.moveTo = (selected) => {
-    current = selected;
-    slider.value = toSlider(selected);
-    slider.setAttribute("aria-valuetext", `${selected} ${field.unit}`.trim());
+    slider.value = selected;
+    slider.setAttribute("aria-valuetext", `${selected} ${unit}`.trim());
   };
   slider.moveTo(value);
-  slider.addEventListener("input", () => {
-    const selected = Math.min(high, Math.max(low, rounding(fromSlider(Number(slider.value)) / step, step)));
-    if (selected !== current) onMove(selected);
-  });
-  slider.addEventListener("keydown", (event) => {
-    if (event.key === "Home" || event.key === "End") { event.preventDefault(); onMove(event.key === "Home" ? low : high); return; }
-    moveByKey(event, current, step, low, high, onMove);
-  });
+  slider.addEventListener("input", () => onMove(Number(slider.value)));
   return slider;
 }
 

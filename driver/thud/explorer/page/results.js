@@ -158,41 +158,12 @@ function showCriteria(variants) {
   byId("criteria_text").textContent = `${uncertainties}${variants[0].answer.criteria[0].standard ?? ""}`;
 }
 
-/** Return the name of a criterion, which shows its explanation on hover and focus. */
+/** Return the name of a criterion, which opens its explanation. */
 function term(criterion) {
   const name = capitalize(criterion.name) + (criterion.unit ? `, ${criterion.unit}` : "");
-  const result = element("button", { type: "button", class: "term", "aria-describedby": "tip" }, name);
-  const open = () => showTip(result, [
-    ["", criterion.explanation], ["Limits: ", criterion.limit_source], ["Standard: ", criterion.standard],
-  ].filter(([, text]) => text));
-  result.addEventListener("pointerenter", open);
-  result.addEventListener("focus", open);
-  result.addEventListener("click", open);
-  result.addEventListener("pointerleave", hideTip);
-  result.addEventListener("blur", hideTip);
-  return result;
-}
-
-function showTip(owner, lines) {
-  const tip = byId("tip");
-  tip.replaceChildren(...lines.map(([title, text]) => element("p", {}, element("b", {}, title), ...withSymbols(text))));
-  tip.hidden = false;
-  const at = owner.getBoundingClientRect();
-  const isBelow = at.bottom + tip.offsetHeight + 8 < innerHeight;
-  // On a phone it stands at the bottom, away from the rows beside its owner, or at the top.
-  const isNarrow = tip.offsetWidth > innerWidth - 40;
-  if (isNarrow) {
-    const bottom = innerHeight - tip.offsetHeight - 4;
-    tip.style.left = "8px";
-    tip.style.top = `${at.bottom + at.height < bottom ? bottom : byId("headline").getBoundingClientRect().bottom + 4}px`;
-    return;
-  }
-  tip.style.left = `${Math.max(8, Math.min(at.left, innerWidth - tip.offsetWidth - 8))}px`;
-  tip.style.top = `${isBelow ? at.bottom + 4 : Math.max(4, at.top - tip.offsetHeight - 4)}px`;
-}
-
-export function hideTip() {
-  byId("tip").hidden = true;
+  const lines = [["", criterion.explanation], ["Limits: ", criterion.limit_source], ["Standard: ", criterion.standard]];
+  return element("details", { class: "term" }, element("summary", {}, name),
+    ...lines.filter(([, text]) => text).map(([title, text]) => element("p", {}, element("b", {}, title), ...withSymbols(text))));
 }
 
 /** Show how the floors move. */

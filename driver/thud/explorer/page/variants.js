@@ -8,8 +8,6 @@ import { about, defaultOf, factsOf, findField } from "./form.js";
 const WORDS = { "ball.youngs_modulus": "E", "ball.wall_thickness": "wall", "ball.outer_radius": "radius", "drop.height": "drop", "plate.thickness": "slab", "room.reverberation_time": "T" };
 // Number of differences in a name.
 const MAX_DIFFERENCES = 3;
-const SOURCE_GROUPS = ["sampling", "levels", "limits", "drop", "ball"];
-
 /** Return a free style for a further variant. */
 export function freeStyle(variants) {
   const used = variants.map(({ style }) => style);
@@ -22,7 +20,7 @@ export function nameVariants(variants) {
   const models = variants.filter(({ values }) => values);
   const described = models.map(describe);
   const isShared = new Set(described.map(({ base }) => base)).size === 1 && models.length > 1;
-  const keys = [...new Set(described.flatMap(({ changes }) => [...changes.keys()]))]
+  const keys = [...new Set(described.flatMap(({ changes }) => [...changes]))]
     .filter((key) => models.length === 1 || new Set(models.map(({ values }) => valueText(values, key))).size > 1);
   for (const [i, variant] of models.entries()) {
     const { base, changes } = described[i];
@@ -44,33 +42,34 @@ export function nameVariants(variants) {
 
 /** Return the preset or construction that is closest to a case, and the changed keys, "group.key". */
 function describe({ values, chosen }) {
-  const model = values.model.name;
-  const presets = about.presets.filter((preset) => preset.door === "ball" && preset.values.model.name === model)
-    .map((preset) => ({ base: preset.title, values: preset.values }));
-  const source = closest(values, (group) => isSourceGroup(group, model), [...presets, { base: factsOf("model", model).title, values: { model: values.model, ...factsOf("model", model).values } }]);
-  if (!values.floor) return source;
-  const name = values.floor.name;
-  const constructions = about.constructions.filter((entry) => entry.floor === name).map((entry) => ({ base: entry.name, values: { [name]: withoutDefaults(name, entry.keys), room: entry.room } }));
-  const floor = closest(values, (group) => group === name || group === "room", [...constructions, { base: factsOf("floor", name).title, values: factsOf("floor", name).values }], chosen);
+  const { model, floor } = values;
+  const isFloor = (group) => Boolean(floor) && (group === floor.name || group === "room");
+  const isSource = (group) => !isFloor(group) && !["model", "floor", "unknowns"].includes(group);
+  const presets = about.presets.filter(({ door, values: own }) => door === "ball" && own.model.name === model.name);
+  const ownModel = factsOf("model", model.name);
+  const source = closest(values, isSource, [...presets, { title: ownModel.title, values: { model, ...ownModel.values } }]);
+  if (!floor) return source;
+  const constructions = about.constructions.filter((entry) => entry.floor === floor.name)
+    .map((entry) => ({ title: entry.name, values: { [floor.name]: entry.keys, room: entry.room } }))
+    .sort((one, other) => (other.title === chosen) - (one.title === chosen));
+  const found = closest(values, isFloor, [...constructions, factsOf("floor", floor.name)]);
   const isStandard = source.base === about.presets[0].title && !source.changes.size;
-  return { base: isStandard ? floor.base : `${floor.base}, ${source.base.toLowerCase()}`, changes: new Map([...floor.changes, ...source.changes]) };
+  return {
+    base: isStandard ? found.base : `${found.base}, ${source.base.toLowerCase()}`,
+    changes: new Set([...found.changes, ...source.changes]),
+  };
 }
 
-const isSourceGroup = (group, model) => SOURCE_GROUPS.includes(group) || about.form.some((entry) => entry.part === "model" && entry.name === model && entry.fields.some((field) => field.group === group));
-
-function withoutDefaults(floor, keys) {
-  return Object.fromEntries(Object.entries(keys).filter(([name, value]) => JSON.stringify(findField(floor, name)?.default) !== JSON.stringify(value)));
-}
-
-/** Return the candidate with the fewest changes; of several, the chosen one, or that with the smallest changes. */
-function closest(values, isOwn, candidates, chosen) {
+/** Return the title of the first candidate with the fewest changes, and these. */
+function closest(values, isOwn, candidates) {
+  const keysOf = (groups) => Object.entries(groups).filter(([group]) => isOwn(group))
+    .flatMap(([group, own]) => Object.keys(own).map((name) => `${group}.${name}`));
   const results = candidates.map((candidate) => {
-    const keys = new Set([values, candidate.values].flatMap((groups) => Object.entries(groups).filter(([group]) => isOwn(group)).flatMap(([group, own]) => Object.keys(own).map((name) => `${group}.${name}`))));
-    const changes = [...keys].filter((key) => valueText(values, key) !== valueText(candidate.values, key));
-    const size = candidate.base === chosen ? 0 : changes.reduce((sum, key) => sum + Math.abs(Math.log(keyValue(values, key) / keyValue(candidate.values, key)) || 0), 0);
-    return { base: candidate.base, changes: new Map(changes.map((key) => [key, true])), size };
+    const keys = [...new Set([...keysOf(values), ...keysOf(candidate.values)])];
+    const changes = keys.filter((key) => valueText(values, key) !== valueText(candidate.values, key));
+    return { base: candidate.title, changes: new Set(changes) };
   });
-  return results.reduce((best, result) => (result.changes.size - best.changes.size || result.size - best.size) < 0 ? result : best);
+  return results.reduce((best, result) => (result.changes.size < best.changes.size ? result : best));
 }
 
 function keyValue(values, key) {
