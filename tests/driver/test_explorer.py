@@ -51,6 +51,13 @@ TOKEN = "secret"  # noqa: S105 - of the test
 HEAD = {server.TOKEN: TOKEN}
 CALIBRATION = "2000 N/FS"
 SHELL: dict[str, Any] = {"model": {"name": "hollow_sphere"}}
+FLOOR: dict[str, Any] = {"floor": {"name": "plate"}}
+MODES: dict[str, Any] = {
+    "model": {"name": "measured_modes"},
+    "measured_modes": {
+        "frequency": [24.0, 89.0], "damping_ratio": [0.05, 0.1], "effective_mass": [2.4, 0.1],
+    },
+}  # fmt: skip
 # A case of minutes.
 LONG = {
     "model": {"name": "finite_element"},
@@ -160,7 +167,7 @@ def test_ends_of_sliders_are_allowed() -> None:
                     refused.add(field["name"])
     # Their ranges depend on other keys.
     assert refused == {
-        "outer_radius", "wall_thickness", "belt_mass", "fractional_order",
+        "outer_radius", "wall_thickness", "belt_mass",
     }  # fmt: skip
 
 
@@ -170,7 +177,7 @@ def test_answer_is_that_of_the_library(client: TestClient) -> None:
     assert answer["levels"]["level"] == pytest.approx(impact.levels(), rel=1e-5)
     assert answer["result"] == RESULTS[impact.assess().conforms]
     numbers = {name: value for name, value, *_ in answer["numbers"]}
-    assert numbers["contact time"] == pytest.approx(1e3 * impact.contact_time)
+    assert numbers["contact time"] == pytest.approx(1e3 * impact.contact_time, abs=5.1e-3)
     error = numbers["numerical error of an octave up to"]
     assert error == impact.level_error.max() > 0
     assert max(answer["force"]["value"]) == pytest.approx(impact.floor_force.max(), rel=1e-2)
@@ -250,6 +257,7 @@ def test_floor_and_room_are_answered(client: TestClient) -> None:
     assert layers == [(floor.sheathing_thickness, 0), (floor.joist_height, floor.spacing)]
     size = answer["room"]["size"]
     assert size["length"] * size["width"] * size["height"] == pytest.approx(size["volume"]) == 30
+    assert answer["motion"] is None
     assert max(answer["floor"]["velocity"]["value"]) == pytest.approx(
         1e3 * impact.floor_velocity.max(), rel=0.05
     )
@@ -579,7 +587,7 @@ def test_headline_names_everything_that_is_not_known(client: TestClient) -> None
     content = (RECORDINGS / "drop_1.csv").read_bytes()
     headline = measured(client, content, name="drop_1.csv")["answer"]["headline"]
     assert (headline["why"] + headline["also"]).endswith(
-        "; restitution, force peaks, mass and drop height not known"
+        "; not known: restitution, force peaks, mass, drop height"
     )
 
 
@@ -872,7 +880,7 @@ def test_downloads_are_what_they_say(client: TestClient, tmp_path: Path) -> None
     )
 
 
-@pytest.mark.parametrize("name", ["standard_ball", "finite_elements", "tyre", "floating_floor"])
+@pytest.mark.parametrize("name", ["standard_ball", "finite_elements", "tyre", "slab"])
 def test_script_computes_the_case(
     client: TestClient, name: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -900,33 +908,32 @@ def test_smallest_change_that_conforms_is_found(client: TestClient) -> None:
     answer = last_report(client, "/improve", json=values)["answer"]
     (change,) = (entry for entry in answer["changes"] if entry["key"] == "modal_ball.loss_factor")
     assert change["text"].startswith("Loss factor ")
-
-    def margin(loss: float) -> float:
-        options = {"damping_law": "rising", "loss_factor": loss}
-        verdict = thud.solve(model=thud.ModalBall(**options)).assess()  # type: ignore[arg-type]
-        levels = (entry for entry in verdict.criteria if entry.unit == "dB")
-        return min(entry.margin - entry.estimate.expanded for entry in levels)
-
-    # The change does not end at the limit itself.
-    assert margin(change["value"]) >= 0.1 > margin(change["value"] - 0.01)
-    assert answer["note"].startswith("Each change leaves 0.1 dB to the limits of levels and 2 % of")
     assert answer["none"] == ""
     sizes = [abs(np.log(entry["factor"])) for entry in answer["changes"]]
     assert sizes == sorted(sizes)
+    # The step before does not conform.
+    for loss, conforms in ((change["value"], True), (change["value"] / 1.04, False)):
+        model = thud.ModalBall(damping_law="rising", loss_factor=loss)
+        assert (thud.solve(model=model).assess().conforms == "conforms") == conforms
 
 
-def test_shell_that_no_single_change_helps_says_so(client: TestClient) -> None:
-    answer = last_report(client, "/improve", json=SHELL)["answer"]
-    assert answer["changes"] == []
-    assert "No change of a single parameter makes the source conform" in answer["none"]
-    assert re.search(r"125 Hz 19\.0\d dB, below 21\.5", answer["none"])
-
-
-def test_source_that_conforms_needs_no_change(client: TestClient) -> None:
-    values = client.get("/about").json()["presets"][0]["values"]
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        (SHELL, "No change of a single parameter makes the source conform"),
+        (SHELL, "125 Hz 18.95 dB, below 21.5"),
+        ({"model": {"name": "modal_ball"}}, "The source conforms already."),
+        (MODES, "This model has no parameters to change."),
+        (SHELL | FLOOR | {"room": {"volume": 50.0, "required": 60.0}}, "Choose another source."),
+        (FLOOR | {"room": {"volume": 50.0, "required": 80.0}}, "The requirement is met already."),
+    ],
+)
+def test_search_without_changes_says_why(
+    client: TestClient, values: dict[str, Any], words: str
+) -> None:
     answer = last_report(client, "/improve", json=values)["answer"]
     assert answer["changes"] == []
-    assert answer["none"] == "The source conforms already."
+    assert words in answer["none"]
 
 
 def test_layers_that_meet_the_requirement_of_a_room_are_found(client: TestClient) -> None:
@@ -944,26 +951,11 @@ def test_layers_that_meet_the_requirement_of_a_room_are_found(client: TestClient
         assert required is not None
         assert str(required) in change["text"]
         assert required.verdict == "conforms"
-    met = values | {"room": room | {"required": 80.0}}
-    answer = last_report(client, "/improve", json=met)["answer"]
-    assert answer["none"] == "The requirement is met already."
-
-
-def test_source_that_does_not_conform_is_the_reason_why_no_floor_meets_a_level(
-    client: TestClient,
-) -> None:
-    values = SHELL | {"floor": {"name": "plate"}, "room": {"volume": 50.0, "required": 60.0}}
-    answer = last_report(client, "/improve", json=values)["answer"]
-    assert answer["changes"] == []
-    assert "the source does not conform (125 Hz" in answer["none"]
-    assert "layer" not in answer["none"]
 
 
 def test_bare_slab_that_no_change_helps_gets_a_screed(client: TestClient) -> None:
-    values = next(
-        p["values"] for p in client.get("/about").json()["presets"] if p["name"] == "slab"
-    )
-    values = values | {"room": {"required": 46.0}}
+    plate = vars(thud.construction("concrete 180").floor)
+    values = {"floor": {"name": "plate"}, "plate": plate, "room": {"required": 46.0}}
     answer = last_report(client, "/improve", json=values)["answer"]
     assert answer["changes"] == []
     # The slab has no resilient layer.

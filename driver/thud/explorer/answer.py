@@ -132,7 +132,7 @@ def _numbers(source: ImpactResult) -> list[list[Any]]:
     for name in SAMPLE_QUANTITIES:
         value, quantity = source.quantity(name), QUANTITIES[name]
         if name != other and not math.isnan(value):
-            value *= quantity.display_scale
+            value = round(value * quantity.display_scale, quantity.decimals + 1)
             # One name for the peak of the force that is assessed.
             code = "peak" if name in PEAKS else name
             rows.append([quantity.title, value, quantity.display_unit, code])
@@ -140,20 +140,21 @@ def _numbers(source: ImpactResult) -> list[list[Any]]:
 
 
 def _criterion(criterion: Criterion, source: LimitsSource) -> Answer:
-    """Return a criterion for the page; times are in ms."""
-    scale, unit = (1e3, "ms") if criterion.unit == "s" else (1.0, criterion.unit)
+    """Return a criterion for the page, in its display unit."""
+    quantity, estimate = criterion.quantity, criterion.estimate
+    scale = quantity.display_scale
     name, band = criterion.name.rpartition("octave_")[1:]
-    expanded = round(scale * criterion.estimate.expanded, 6)
+    expanded = round(scale * estimate.expanded, 6)
     # Numerical errors are often too small to be shown.
-    is_computed = criterion.is_computed
-    smallest = 0.5 * 10.0**-criterion.quantity.decimals if is_computed else 0.0
+    smallest = 0.5 * 10.0**-quantity.decimals if criterion.is_computed else 0.0
     return {
-        "name": f"{band.replace('_', '.')} Hz" if name else humanize(band),
+        "name": quantity.title if name else humanize(band),
         "band": band.replace("_", ".") if name else "",
-        "unit": unit,
+        "unit": quantity.display_unit,
         "value": None if np.isnan(criterion.value) else round(scale * criterion.value, 6),
+        "value_text": quantity.show(criterion.value),
         "uncertainty": expanded if expanded > smallest and expanded < np.inf else None,
-        "uncertainty_kind": "numerical" if is_computed else "measured",
+        "uncertainty_kind": "numerical" if criterion.is_computed else "measured",
         "lower": round(scale * criterion.lower, 6),
         "upper": round(scale * criterion.upper, 6),
         "result": RESULTS[criterion.conforms],

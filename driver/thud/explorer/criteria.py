@@ -9,7 +9,7 @@ from thud.base._schema import VERDICTS
 from thud.report.page import STANDARDS
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping
 
     from thud.base._schema import LimitsSource
     from thud.level.assessment import Criterion, Verdict
@@ -99,9 +99,17 @@ def _headline(
     if result == "conforms":
         return _texts(result, words, f"{_closest(verdict)} {detail}")
     entries = [entry for entry in verdict.criteria if entry.conforms == verdict.conforms]
-    causes = {e.quantity.title: _cause(e, shown or {}) for e in entries if not math.isnan(e.value)}
-    unknown = [entry.quantity.title for entry in entries if math.isnan(entry.value)]
-    return _texts(result, words, detail, *_listed(causes, unknown))
+    known = [entry for entry in entries if not math.isnan(entry.value)]
+    parts = [_cause(entry, shown or {}) for entry in known[:MAX_NAMED]]
+    rest = [f"also {', '.join(titles)}"] if (titles := _titles(known[MAX_NAMED:])) else []
+    if unknown := _titles(entry for entry in entries if math.isnan(entry.value)):
+        # Beside other criteria that are not named with their values, on wide screens only.
+        (rest or parts).append(f"not known: {', '.join(unknown)}")
+    return _texts(result, words, detail, f": {'; '.join(parts)}", "".join(f"; {x}" for x in rest))
+
+
+def _titles(criteria: Iterable[Criterion]) -> list[str]:
+    return [criterion.quantity.title for criterion in criteria]
 
 
 def _texts(result: str, words: str, detail: str, why: str = "", also: str = "") -> dict[str, str]:
@@ -111,22 +119,6 @@ def _texts(result: str, words: str, detail: str, why: str = "", also: str = "") 
 
 def _standard(verdict: Verdict) -> str:
     return f"Limits of the {verdict.source.replace('_', ' ')}: {STANDARDS[verdict.source]}."
-
-
-def _listed(causes: Mapping[str, str], unknown: Sequence[str] = ()) -> tuple[str, str]:
-    """Return the first causes; and the titles of the others, and those of unknown quantities."""
-    parts = list(causes.values())[:MAX_NAMED]
-    rest = [f"also {_joined(names)}"] if (names := list(causes)[MAX_NAMED:]) else []
-    missing = [f"{_joined(unknown)} not known"] if unknown else []
-    if not rest:
-        parts, missing = [*parts, *missing], []
-    also = "".join(f"; {text}" for text in (*rest, *missing))
-    return f": {'; '.join(parts)}", also
-
-
-def _joined(names: Sequence[str]) -> str:
-    """Return names joined by commas and "and"."""
-    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
 def _closest(verdict: Verdict) -> str:

@@ -64,9 +64,8 @@ def fit_recording(
             f"the restitution of the recording is {number}: no ball can be fitted to it",
             "0 to 1; check mass, drop height, calibration, drops and polarity",
         )
-    with warnings.catch_warnings():
-        # They are part of the text.
-        warnings.simplefilter("ignore")
+    # Warnings are part of the text.
+    with warnings.catch_warnings(action="ignore"):
         result = fit(ForceTarget(recording), parameters, case)
     for name, value in known.items():
         field = field_of(case, name)
@@ -116,9 +115,8 @@ def fit_press(paths: Sequence[str], values: Values) -> dict[str, Any]:
     rest = len(deflection) - count
     left_out = [f"the {rest} points after the largest deflection are left out"] if rest else []
     try:
-        with warnings.catch_warnings():
-            # They are part of the details.
-            warnings.simplefilter("ignore")
+        # Warnings are part of the details.
+        with warnings.catch_warnings(action="ignore"):
             model = new_model(case.model, {})
             result = fit_compression(deflection[used], force[used], case.ball, model)
     except ThudError as error:

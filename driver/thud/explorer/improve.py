@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from collections.abc import Generator, Mapping
 
     from thud.case.case import Case
-    from thud.level.assessment import Criterion
     from thud.level.rating import Requirement
 
     # Yields begin and end of the fraction of the work of the next step, and returns the answer.
@@ -34,13 +33,7 @@ if TYPE_CHECKING:
 # Changes of a parameter of a source, the smallest first, and number of drops in one call.
 STEPS = np.exp(0.03 * np.array([sign * i for i in range(1, 24) for sign in (1, -1)]))
 BLOCK = 12
-# Margins that a change leaves besides the numerical error: of a level, dB, and of another criterion
-# over the width of its range.
-LEVEL_MARGIN, OTHER_MARGIN = 0.1, 0.02
-NOTE = (
-    f"Each change leaves {LEVEL_MARGIN:g} dB to the limits of levels and {100 * OTHER_MARGIN:g} % "
-    "of the range to those of other criteria, besides the numerical error."
-)
+NOTE = "Changes conform by this model, with its numerical error; some are close to a limit."
 # Layers of floors, which become thicker by 10 mm or softer by 10 % in each step, up to twice as
 # thick or a fifth as stiff.
 THICKNESSES = "thickness", "screed_thickness", "subceiling_thickness"
@@ -74,7 +67,7 @@ def improve(values: dict[str, dict[str, Any]]) -> Work:
 
 
 def _improve_source(case: Case) -> Work:
-    """Return the smallest change of each parameter of a source, which leaves margins."""
+    """Return the smallest change of each parameter of a source."""
     verdict = compute(case).assess()
     if verdict.conforms == VERDICTS[0]:
         return _answer(none="The source conforms already.", note=NOTE)
@@ -92,8 +85,8 @@ def _improve_source(case: Case) -> Work:
         yield i / len(work), (i + 1) / len(work)
         conforms = solve_many({name: block}, case).conforms
         for value in np.array(block)[conforms].tolist():
-            criteria = compute(with_values(case, {name: value})).assess().criteria
-            if all(map(_has_margin, criteria)):
+            # With numerical errors, which many drops do not have.
+            if compute(with_values(case, {name: value})).assess().conforms == VERDICTS[0]:
                 found[name] = value
                 break
     if found:
@@ -218,13 +211,6 @@ def _constructions(case: Case) -> dict[str, Case]:
         if keys and floor and entry.floor.name == floor.name
         if all(getattr(entry.floor, key) == getattr(floor, key) for key in keys)
     }
-
-
-def _has_margin(criterion: Criterion) -> bool:
-    """Whether a criterion that is met leaves a margin besides its numerical error."""
-    width = criterion.upper - criterion.lower
-    margin = LEVEL_MARGIN if criterion.unit == "dB" else OTHER_MARGIN * width
-    return criterion.margin - criterion.estimate.expanded >= margin
 
 
 def _change(case: Case, name: str, value: float, reached: str = "") -> dict[str, Any]:
