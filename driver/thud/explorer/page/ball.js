@@ -7,24 +7,19 @@ const DURATION = 5000;
 // Heights of the lower ends of belt and rim of a tyre before the impact, and of its drawing, mm.
 const CARCASS = [45, 125];
 const TYRE_HEIGHT = 180;
-const isStill = matchMedia("(prefers-reduced-motion: reduce)");
 let motion = null;
 let playing = 0;
-let endsAfterPass = false;
-let hasPlayed = false;
 
-/** Show the motion of an answer; hide the section if there is none. Without a wish for less motion it plays once. */
+/** Show the motion of an answer; hide the section if there is none. */
 export function showBall(newMotion) {
   motion = newMotion ?? null;
   byId("ball_section").hidden = !motion;
   if (!motion) { stopBall(); setCursor(byId("force"), null); return; }
   renderBall();
-  if (!hasPlayed && !isStill.matches) startBall(true);
-  hasPlayed = true;
 }
 
 export function listenToBall() {
-  byId("play").addEventListener("click", () => (playing ? stopBall() : startBall(false)));
+  byId("play").addEventListener("click", () => (playing ? stopBall() : startBall()));
   byId("instant").addEventListener("input", () => { stopBall(); renderBall(); });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { if (motion) renderBall(); });
 }
@@ -35,19 +30,15 @@ function stopBall() {
   byId("play").textContent = "Play";
 }
 
-function startBall(once) {
-  endsAfterPass = once;
+function startBall() {
   byId("play").textContent = "Pause";
-  let [last, passed] = [performance.now(), 0];
+  let last = performance.now();
   const step = (now) => {
     const slider = byId("instant");
-    const part = (now - last) / DURATION;
+    slider.value = (Number(slider.value) + (now - last) / DURATION) % 1;
     last = now;
-    passed += part;
-    slider.value = (Number(slider.value) + part) % 1;
     if (motion) renderBall();
-    if (endsAfterPass && passed >= 1) stopBall();
-    else playing = requestAnimationFrame(step);
+    playing = requestAnimationFrame(step);
   };
   playing = requestAnimationFrame(step);
 }

@@ -131,16 +131,16 @@ function removeVariant(variant) {
   commit();
 }
 
-/** Give a variant a name of the user; an empty one takes it back, and null changes nothing. The focus returns to the name unless it has left. */
-function renameVariant(variant, text, isLeft) {
+/** Give a variant a name of the user; an empty one takes it back, and null changes nothing. */
+function renameVariant(variant, text) {
   const at = shown.indexOf(variant);
-  const title = text || undefined;
-  if (text !== null && text !== variant.label) {
+  const title = text?.trim() || undefined;
+  if (text !== null && title !== variant.label) {
     if (kept.list.includes(variant)) kept.list = kept.list.map((other) => (other === variant ? { ...variant, title } : other));
     else state.titles = { ...state.titles, [variant.door]: { text: title, subject: subjectOf(variant.door) } };
   }
   showAll();
-  if (!isLeft) document.querySelectorAll("#variants .name")[at]?.focus();
+  document.querySelectorAll("#variants .name")[at]?.focus();
   commit();
 }
 

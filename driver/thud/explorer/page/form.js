@@ -4,7 +4,7 @@ import { pressInputs } from "./press.js";
 
 /** What the server says of itself, and the case: values that differ from their defaults, the construction that was chosen, what is not known, by model, fields of the recording and those that were stated for an earlier one, names of the user, and what the plots show. */
 export const about = { form: [], constructions: [], models: [], floors: [], presets: [], recording: [] };
-export const state = { door: "ball", model: "", floor: "plate", chosen: "", room: true, values: {}, unknowns: {}, recording: {}, earlier: [], titles: {}, view: { thirds: false, differences: false } };
+export const state = { door: "ball", model: "", floor: "plate", chosen: "", room: true, values: {}, unknowns: {}, recording: {}, earlier: [], titles: {}, view: { thirds: false } };
 
 // Digits of a number in its field.
 const DIGITS = 6;
@@ -71,63 +71,48 @@ export function caseValues(door = state.door) {
 
 const isTable = (values) => Boolean(values) && typeof values === "object" && !Array.isArray(values);
 
+/** Return the known fields of values by group and key, with their values. */
+const entriesOf = (values) => Object.entries(values)
+  .flatMap(([group, own]) => Object.entries(own).map(([name, value]) => [findField(group, name), value]))
+  .filter(([field]) => field);
+
 /** Return whether values are a case with a known model and floor, and have the kinds of their fields. */
 export function isCase(values) {
   if (!isTable(values) || !Object.values(values).every(isTable)) return false;
-  const hasKind = (value, field) => !field || (Array.isArray(field.default) ? [value].flat().every((item) => typeof item === "number") : typeof value === typeof field.default);
-  const hasKinds = ([group, own]) => Object.entries(own).every(([name, value]) => value !== null && hasKind(value, findField(group, name)));
-  return Boolean(findGroup("model", values.model?.name) && (!values.floor || findGroup("floor", values.floor.name))) && Object.entries(values).every(hasKinds);
+  const isNumber = (item) => typeof item === "number";
+  const hasKind = ([field, value]) => (field.kind === "list" ? [value].flat().every(isNumber) : typeof value === typeof field.default);
+  return Boolean(findGroup("model", values.model?.name) && (!values.floor || findGroup("floor", values.floor.name))) && entriesOf(values).every(hasKind);
 }
 
 /** Take over the source of a case, or all of it. */
 export function takeValues(values) {
   const { model, floor, ...rest } = values.model ? values : { ...values, ...about.presets[0].values };
-  for (const { fields } of sourceGroups()) for (const field of fields) if (field.group !== "model") delete state.values[field.group];
+  const clear = (groups) => { for (const { fields } of groups) for (const field of fields) delete state.values[field.group]; };
+  clear(sourceGroups());
   state.model = model.name;
-  if (floor) setFloor(floor.name);
+  if (floor) choose("floor", floor.name);
   if (floor || rest.room) {
     state.floor = floor?.name ?? "plate";
     if (hasRoom()) state.room = Boolean(rest.room);
-    for (const { fields } of floorGroups()) for (const field of fields) delete state.values[field.group];
+    clear(floorGroups());
   }
   if (rest.unknowns) state.unknowns[model.name] = rest.unknowns;
-  for (const { fields } of [...sourceGroups(), ...floorGroups()]) {
-    for (const field of fields) {
-      const value = rest[field.group]?.[field.name];
-      if (value === undefined || value === null) continue;
-      setValue(field, field.kind === "list" && !Array.isArray(value) ? [value] : value);
-    }
+  for (const [field, value] of entriesOf(rest)) {
+    if (value !== null) setValue(field, field.kind === "list" ? [value].flat() : value);
   }
 }
 
-/** Replace the values that belong to a model or a floor, where they were not changed, by those of another. */
-function exchange(old, next) {
-  for (const [group, values] of Object.entries(old)) {
-    for (const [name, value] of Object.entries(values)) {
-      const field = findField(group, name);
-      if (field && isSame(valueOf(field), value)) setValue(field, defaultOf(field));
-    }
-  }
-  for (const [group, values] of Object.entries(next)) for (const [name, value] of Object.entries(values)) {
-    const field = findField(group, name);
-    if (field) setValue(field, value);
-  }
+/** Choose a model or a floor: values that belong to the old one, where they were not changed, are replaced by those of the next. */
+function choose(part, name) {
+  for (const [field, value] of entriesOf(factsOf(part, state[part]).values)) if (isSame(valueOf(field), value)) setValue(field, defaultOf(field));
+  for (const [field, value] of entriesOf(factsOf(part, name).values)) setValue(field, value);
+  state[part] = name;
 }
 
 /** Return whether the floor has a plate that radiates into a room. */
 const hasRoom = () => factsOf("floor", state.floor).has_room !== false;
 /** The room remains chosen while a floor has none. */
 const showsRoom = () => state.room && hasRoom();
-
-function setModel(name) {
-  exchange(factsOf("model", state.model).values, factsOf("model", name).values);
-  state.model = name;
-}
-
-function setFloor(name) {
-  exchange(factsOf("floor", state.floor).values, factsOf("floor", name).values);
-  state.floor = name;
-}
 
 // ---- Constructions.
 
@@ -137,9 +122,10 @@ const ceilingFields = () => findGroup("room", "room").fields.filter((field) => f
 
 /** Return the construction whose values the form has, if there is one, and choose it; of several, the chosen one. */
 function findConstruction() {
-  const hasValues = (fields, values) => fields.every((field) => isSame(valueOf(field), values[field.name] ?? defaultOf(field)));
-  const equal = about.constructions.filter((construction) => construction.floor === state.floor && hasValues(filledFields(construction), construction.keys)
-    && (showsRoom() ? hasValues(ceilingFields(), construction.room) : !Object.keys(construction.room).length));
+  const { floor } = state;
+  const ceiling = ceilingFields();
+  const equal = about.constructions.filter((entry) => entry.floor === floor && haveValues(filledFields(entry), { [floor]: entry.keys })
+    && (showsRoom() ? haveValues(ceiling, { room: entry.room }) : !Object.keys(entry.room).length));
   const construction = equal.find(({ name }) => name === state.chosen) ?? equal[0];
   if (construction) state.chosen = construction.name;
   return construction;
@@ -183,23 +169,37 @@ function replaceInputs(children) {
   kept.append(...children[at].querySelectorAll(":scope > .help"));
 }
 
+const balls = () => about.presets.filter(({ door }) => door === "ball");
+
+/** Return whether fields have the values of a case or, where it states none, their defaults. */
+const haveValues = (fields, values) => fields.every((field) =>
+  isSame(valueOf(field), values[field.group]?.[field.name] ?? defaultOf(field)));
+
+/** Return whether the source of the form is that of a preset. */
+const isChosen = ({ values }) => values.model.name === state.model && !state.unknowns[state.model]
+  && sourceGroups().every(({ fields }) => haveValues(fields.filter((field) => isUsed(field)), values));
+
 function ballInputs(handlers) {
-  const current = caseValues("ball");
-  const choices = about.presets.filter((preset) => preset.door === "ball").map((preset) => button(preset.title, () => { takeValues(preset.values); handlers.rebuild(); },
-    { id: `preset_${preset.name}`, "aria-pressed": String(isSame(sorted(preset.values), sorted(current))), title: preset.text }));
-  const chosen = about.presets.find((preset) => isSame(sorted(preset.values), sorted(current)));
+  const choices = balls().map((preset) => button(preset.title, () => { takeValues(preset.values); handlers.rebuild(); },
+    { id: `preset_${preset.name}`, "aria-pressed": String(isChosen(preset)), title: preset.text }));
   // The first two are both standard balls, and their lines say which to trust.
-  const lines = about.presets.filter((preset, i) => i < 2 || preset === chosen);
+  const lines = balls().filter((preset, i) => i < 2 || isChosen(preset));
   const common = commonGroups();
   const own = findGroup("model", state.model);
   return [
     element("fieldset", {}, element("legend", {}, "Start from"), element("div", { class: "choices" }, ...choices), pressInputs(handlers.onPress),
       element("ul", { class: "help" }, ...lines.map(({ title, text }) => element("li", {}, element("b", {}, title), `: ${text}.`)))),
-    choiceOf("model", "Model", about.models.map(({ name, title }) => [name, title]), state.model, (name) => { setModel(name); handlers.rebuild(); },
-      element("p", { class: "help" }, `${factsOf("model", state.model).purpose}. `, element("em", {}, factsOf("model", state.model).validity))),
+    kindInput("model", "Model", about.models, handlers),
     ...[...common.slice(0, 2), own, ...common.slice(2)].map((group) => groupElement(group, handlers)),
     foldedElement([own, ...common], handlers),
   ];
+}
+
+/** Return the choice of a model or a floor, and what it is for. */
+function kindInput(part, label, kinds, handlers) {
+  const { purpose, validity } = factsOf(part, state[part]);
+  return choiceOf(part, label, kinds.map(({ name, title }) => [name, title]), state[part], (name) => { choose(part, name); handlers.rebuild(); },
+    element("p", { class: "help" }, `${purpose}. `, element("em", {}, validity)));
 }
 
 function floorInputs(handlers) {
@@ -210,8 +210,7 @@ function floorInputs(handlers) {
   const rooms = groupsOf("room");
   const isRequirement = ({ name }) => ["required", "rating"].includes(name);
   const withFields = (group, isOwn) => ({ ...group, fields: group.fields.filter(isOwn) });
-  const balls = about.presets.filter((preset) => preset.door === "ball");
-  const source = balls.find((preset) => isSame(sorted(preset.values), sorted(caseValues("ball"))));
+  const source = balls().find(isChosen);
   const box = element("input", { type: "checkbox", id: "has_room" });
   box.checked = showsRoom();
   box.disabled = !hasRoom();
@@ -219,22 +218,15 @@ function floorInputs(handlers) {
   return [
     choiceOf("construction", "Construction", options, construction?.name ?? "", (name) => { fillConstruction(name); handlers.rebuild(); },
       element("p", { class: "help", id: "construction_text" }, construction?.text ?? "Changed values of a floor.")),
-    choiceOf("source", "Dropped on it", [...(source ? [] : [["", "A changed source"]]), ...balls.map(({ name, title }) => [name, title])], source?.name ?? "",
-      (name) => { takeValues(balls.find((preset) => preset.name === name).values); handlers.rebuild(); }),
+    choiceOf("source", "Dropped on it", [...(source ? [] : [["", "A changed source"]]), ...balls().map(({ name, title }) => [name, title])], source?.name ?? "",
+      (name) => { takeValues(balls().find((preset) => preset.name === name).values); handlers.rebuild(); }),
     ...(showsRoom() ? rooms.map((group) => groupElement({ ...withFields(group, isRequirement), title: "Requirement" }, handlers)) : []),
     element("label", { class: "toggle" }, box, "Room below"),
     ...(showsRoom() ? rooms.map((group) => groupElement(withFields(group, (field) => !isRequirement(field)), handlers, sources)) : []),
-    choiceOf("floor", "Kind of floor", about.floors.filter(({ name }) => name !== "rigid").map(({ name, title }) => [name, title]), state.floor, (name) => { setFloor(name); handlers.rebuild(); },
-      element("p", { class: "help" }, `${factsOf("floor", state.floor).purpose}. `, element("em", {}, factsOf("floor", state.floor).validity))),
+    kindInput("floor", "Kind of floor", about.floors.filter(({ name }) => name !== "rigid"), handlers),
     groupElement(findGroup("floor", state.floor), handlers, sources),
     foldedElement(floorGroups(), handlers, sources),
   ];
-}
-
-/** Return values in the order of their names, without empty groups, for comparisons. */
-function sorted(values) {
-  const order = (entries) => Object.fromEntries(Object.entries(entries).sort(([one], [other]) => (one < other ? -1 : 1)));
-  return order(Object.fromEntries(Object.entries(values).filter(([name, group]) => name === "room" || Object.keys(group).length).map(([name, group]) => [name, order(group)])));
 }
 
 function choiceOf(id, label, options, value, onSelect, ...rest) {
@@ -287,8 +279,7 @@ const helpOf = ({ help, kind }) => `${help}.${kind === "list" ? " Blanks or semi
 
 /** Show which preset or construction the form has. */
 function showChoices() {
-  const current = sorted(caseValues("ball"));
-  for (const preset of about.presets) byId(`preset_${preset.name}`)?.setAttribute("aria-pressed", String(isSame(sorted(preset.values), current)));
+  for (const preset of balls()) byId(`preset_${preset.name}`)?.setAttribute("aria-pressed", String(isChosen(preset)));
   if (!byId("construction")) return;
   const construction = findConstruction();
   byId("construction").value = construction?.name ?? "";

@@ -1,6 +1,6 @@
 // Display of answers: headline, plots, criteria, floor, room and warnings.
-import { byId, capitalize, digits, element, minus, rounded, signed, withSymbols } from "./page.js";
-import { interpolate, plot, swatch } from "./plot.js";
+import { byId, capitalize, element, minus, rounded, signed, withSymbols } from "./page.js";
+import { plot, swatch } from "./plot.js";
 
 // Uncertainties by their codes: titles, and what stands below the criteria.
 const UNCERTAINTIES = { numerical: ["numerical error", "numerical error of the computation"], measured: ["uncertainty (95 %)", "measurement uncertainty (95 %)"] };
@@ -15,7 +15,6 @@ const MIN_UNCERTAINTY = 0.02;
 /** Return the headline of an answer as a text. */
 export const headlineText = ({ headline: { words, why, also } }) => `${words}${why}${also}`;
 
-const valueTextOf = (criterion) => criterion.value_text ?? digits(criterion.value, criterion.unit);
 const uncertaintyText = ({ uncertainty, uncertainty_text: text, mark }) => `${text ?? Number(uncertainty.toPrecision(2))}${mark ? ` ${mark}` : ""}`;
 
 /** Show the answer to the question; `variant` has a label and an answer. */
@@ -47,65 +46,50 @@ function endsOf({ value, uncertainty }) {
   return uncertainty > MIN_UNCERTAINTY ? [value - uncertainty, value + uncertainty] : [];
 }
 
-/** Show force and levels of variants; options: third octaves, and differences to the first variant. */
-function showForces(variants, { thirds, differences }) {
-  const isDifference = differences && variants.length > 1;
+/** Show force and levels of variants, in octaves or one-third octaves. */
+function showForces(variants, { thirds }) {
   const [first] = variants;
-  const shown = isDifference ? variants.slice(1) : variants;
   const levelsOf = ({ answer }) => (thirds ? answer.levels.thirds : answer.levels);
   const bands = levelsOf(first).frequency;
-  const octaves = first.answer.criteria.filter((criterion) => criterion.band);
+  const octavesOf = ({ answer }) => answer.criteria.filter((criterion) => criterion.band);
   plot(byId("levels"), {
     title: "Force exposure level",
-    curves: shown.map((variant) => {
-      const levels = levelsOf(variant).level;
-      const hasEnds = !thirds && !isDifference;
-      return {
-        name: variant.label, style: variant.style, x: bands.map((_, k) => k), marks: true,
-        y: isDifference ? levels.map((level, k) => minusLevel(level, levelsOf(first).level[k])) : levels,
-        ends: hasEnds ? variant.answer.criteria.filter((criterion) => criterion.band).map(endsOf) : undefined,
-      };
-    }),
+    curves: variants.map((variant) => ({
+      name: variant.label, style: variant.style, x: bands.map((_, k) => k), marks: true,
+      y: levelsOf(variant).level, ends: thirds ? undefined : octavesOf(variant).map(endsOf),
+    })),
     x: { title: thirds ? "One-third-octave band" : "Octave band", unit: "Hz", bands: bands.map(String) },
-    y: { title: isDifference ? `Difference to ${first.label}` : "Level", unit: "dB", reference: isDifference ? "" : " re 1 N", zero: isDifference },
-    limits: thirds || isDifference ? undefined : octaves.map((criterion) => [criterion.lower, criterion.upper]),
-    results: octaves.map(({ result }) => result),
-  });
-  const curves = shown.flatMap((variant) => {
-    const { force, floor } = variant.answer;
-    const reference = first.answer.force;
-    const y = isDifference ? force.time.map((time, i) => force.value[i] - interpolate(reference.time, reference.value, time)) : force.value;
-    const onFloor = floor && !isDifference ? [{ name: `${variant.label}, on the floor`, style: variant.style, x: floor.force.time, y: floor.force.value, thin: true }] : [];
-    return [{ name: variant.label, style: variant.style, x: force.time, y }, ...onFloor];
+    y: { title: "Level", unit: "dB", reference: " re 1 N" },
+    limits: thirds ? undefined : octavesOf(first).map((criterion) => [criterion.lower, criterion.upper]),
+    results: octavesOf(first).map(({ result }) => result),
   });
   byId("force_title").textContent = FORCES[first.answer.force.kind ?? "floor"];
   plot(byId("force"), {
-    title: byId("force_title").textContent, curves, hasCursor: !isDifference,
+    title: byId("force_title").textContent, hasCursor: true,
+    curves: variants.flatMap(({ label, style, answer: { force, floor } }) => [
+      { name: label, style, x: force.time, y: force.value },
+      ...(floor ? [{ name: `${label}, on the floor`, style, x: floor.force.time, y: floor.force.value, thin: true }] : []),
+    ]),
     x: { title: "Time", unit: "ms" },
-    y: { title: isDifference ? `Difference to ${first.label}` : "Force, low-passed at 1.25 kHz", unit: "N", zero: true },
+    y: { title: "Force, low-passed at 1.25 kHz", unit: "N", zero: true },
   });
 }
 
-const minusLevel = (level, reference) => (level === null || reference === null ? null : level - reference);
-
 /** Show the levels in the room below, what makes them uncertain, and the ratings. */
-function showRooms(variants, { differences }) {
+function showRooms(variants) {
   const rooms = variants.filter((variant) => variant.answer.room);
   const hasRoom = Boolean(variants[0].answer.room);
   for (const name of ["room_figure", "contributions_figure"]) byId(name).hidden = !hasRoom;
   if (!hasRoom) return;
   const [first] = rooms;
-  const isDifference = differences && rooms.length > 1;
-  byId("room_key").hidden = isDifference;
   plot(byId("room"), {
     title: "Level in the room below",
-    curves: (isDifference ? rooms.slice(1) : rooms).map(({ label, style, answer: { room } }) => ({
-      name: label, style, x: room.level.map((_, k) => k), marks: true,
-      y: isDifference ? room.level.map((level, k) => minusLevel(level, first.answer.room.level[k])) : room.level,
-      ends: isDifference ? undefined : room.level.map((level, k) => [level - room.uncertainty[k], level + room.uncertainty[k]]),
+    curves: rooms.map(({ label, style, answer: { room } }) => ({
+      name: label, style, x: room.level.map((_, k) => k), marks: true, y: room.level,
+      ends: room.level.map((level, k) => [level - room.uncertainty[k], level + room.uncertainty[k]]),
     })),
     x: { title: "One-third-octave band", unit: "Hz", bands: first.answer.room.frequency.map(String) },
-    y: { title: isDifference ? `Difference to ${first.label}` : "Maximum Fast level", unit: "dB", reference: isDifference ? "" : " re 20 µPa", zero: isDifference },
+    y: { title: "Maximum Fast level", unit: "dB", reference: " re 20 µPa" },
   });
   plot(byId("contributions"), {
     title: "Contributions to the standard uncertainty", x: { title: "Standard uncertainty", unit: "dB" },
@@ -133,7 +117,7 @@ function missedSide(criterion) {
 /** Show the criteria of the standards; their names explain themselves. */
 function showCriteria(variants) {
   const cell = (criterion) => {
-    const value = element("td", { class: `value ${criterion.result}` }, valueTextOf(criterion));
+    const value = element("td", { class: `value ${criterion.result}` }, minus(criterion.value_text || "not known"));
     if (criterion.uncertainty) value.append(" ", element("span", { title: UNCERTAINTIES[criterion.uncertainty_kind][0] }, `± ${uncertaintyText(criterion)}`));
     return value;
   };
@@ -185,12 +169,6 @@ export function showFloors(variants) {
     element("tbody", {}, ...rows.map(([first, ...cells]) => element("tr", {}, element("th", { scope: "row" }, first), ...cells.map((text) => element("td", {}, minus(text)))))));
 }
 
-/** Show the plots of room or force. */
-export function showPlots(variants, options) {
-  showRooms(variants, options);
-  if (!variants[0].answer.room) showForces(variants, options);
-}
-
 /** Show headline, plots and criteria of variants, of which the first is the answer of its door. */
 export function showAnswer(variants, options) {
   const [{ door, answer: { room } }] = variants;
@@ -198,6 +176,7 @@ export function showAnswer(variants, options) {
   for (const name of ["levels_figure", "force_figure"]) byId(name).hidden = Boolean(room);
   byId("force_figure").classList.toggle("second", !room);
   byId("criteria_section").hidden = door === "floor";
-  showPlots(variants, options);
+  showRooms(variants);
+  if (!room) showForces(variants, options);
   if (door !== "floor") showCriteria(variants);
 }

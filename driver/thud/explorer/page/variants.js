@@ -116,8 +116,8 @@ export function showVariants(variants, { remove, rename }) {
     return element("td", {}, text, element("small", {}, difference ? `${signed(difference, "dB", decimals)}` : "±0"));
   };
   const rows = variants.map((variant, i) => {
-    const name = element("button", { type: "button", class: "name", title: "Rename", "aria-label": `Rename ${variant.label}` }, variant.label);
-    name.addEventListener("click", () => renameIn(name, variant, rename));
+    const name = button(variant.label, () => rename(variant, prompt("Name of the variant", variant.label)),
+      { class: "name", title: "Rename", "aria-label": `Rename ${variant.label}` });
     const { answer } = variant;
     const source = sourceOf(variant).result;
     return element("tr", {}, element("th", { scope: "row" }, element("span", { class: "named" }, swatch(variant.style), name)),
@@ -130,26 +130,6 @@ export function showVariants(variants, { remove, rename }) {
     element("thead", {}, element("tr", {}, element("th", { scope: "col" }, "Variant"), ...(hasVerdict ? [element("th", { scope: "col" }, hasLevel ? "Source" : "Verdict")] : []), ...(hasLevel ? [element("th", { scope: "col" }, "Level")] : []),
       ...columns.map(([title, , unit]) => element("th", { scope: "col" }, title, element("small", {}, ` ${unit}`))), element("td", {}))),
     element("tbody", {}, ...rows));
-  byId("differences").disabled = variants.length < 2;
-}
-
-function renameIn(name, variant, rename) {
-  const input = element("input", { type: "text", "aria-label": "Name", value: variant.label });
-  let isFinished = false;
-  const finish = (text, isLeft = false) => {
-    if (isFinished) return;
-    // Its removal is a blur, too.
-    isFinished = true;
-    rename(variant, text, isLeft);
-  };
-  input.addEventListener("keydown", (event) => {
-    // The name that gets the focus must not be pressed by the same key.
-    if (event.key === "Enter") { event.preventDefault(); finish(input.value.trim()); }
-    if (event.key === "Escape") { event.stopPropagation(); finish(null); }
-  });
-  input.addEventListener("blur", () => finish(input.value.trim(), true));
-  name.replaceWith(input);
-  input.select();
 }
 
 function sourceColumns([first]) {
