@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import chain, combinations, count
 from pathlib import Path
-from typing import TYPE_CHECKING, overload
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from tqdm import tqdm
@@ -141,25 +141,9 @@ def _cell(criterion: Criterion) -> str:
     return Result(f"{text} {state if verdict == VERDICTS[1] else verdict}", verdict)
 
 
-# mypy infers the type of a dictionary of several kinds from the parameter of an overload only.
-@overload
+# Values of a mapping are checked when they are used: mypy infers no type for several kinds.
 def compare(
-    impacts: Mapping[str, Case | ImpactResult],
-    force: LevelsForce | None = None,
-    source: LimitsSource | None = None,
-    *,
-    progress: bool = False,
-) -> Comparison: ...
-@overload
-def compare(
-    impacts: Iterable[Case | ImpactResult],
-    force: LevelsForce | None = None,
-    source: LimitsSource | None = None,
-    *,
-    progress: bool = False,
-) -> Comparison: ...
-def compare(
-    impacts: Mapping[str, Case | ImpactResult] | Iterable[Case | ImpactResult],
+    impacts: Mapping[str, Any] | Iterable[Case | ImpactResult],
     force: LevelsForce | None = None,
     source: LimitsSource | None = None,
     *,

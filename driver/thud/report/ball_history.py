@@ -51,18 +51,12 @@ LIMITS = ("lower", "upper")
 VALUES = ("value", "uncertainty", "expanded_uncertainty")
 
 
-@dataclass(frozen=True, eq=False)
-class Trend(Immutable):
+class Trend(NamedTuple):
     """Straight line through the values of a criterion.
 
-    Attributes
-    ----------
-    slope, expanded : float
-        Change per year and its expanded uncertainty (95 %).
-    significant : bool
-        Whether the slope is significant, at 5 % for all criteria together.
-    time, value : ndarray, shape (2,)
-        Times of the first and the last value, years since the first report, and the line there.
+    `slope` is the change per year and `expanded` its expanded uncertainty (95 %); `significant`
+    holds at 5 % for all criteria together. `time` has the first and the last value, years since
+    the first report, shape (2,), and `value` the line there.
     """
 
     slope: float

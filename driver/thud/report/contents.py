@@ -34,6 +34,12 @@ if TYPE_CHECKING:
 FORMAT = "thud calibration report 1"
 # Code of the note on drops that the laboratory left out.
 LEFT_OUT = "drop_left_out"
+# Keys of the configuration, and values of a file, that a report repeats.
+OF_THE_CONFIGURATION = (
+    "laboratory", "ball", "serial", "temperature", "mass", "height", "mass_uncertainty",
+    "height_uncertainty",
+)  # fmt: skip
+OF_A_FILE = ("name", "date", "calibration", "sample_rate", "drops")
 # What ISO/IEC 17025:2017, 7.8.2 to 7.8.4, asks of a report, by the key that states it.
 FIELDS = {
     "number": "number of the report",
@@ -69,21 +75,14 @@ def report_data(recording: Recording) -> dict[str, Any]:
         "thud": version(),
         "name": recording.name,
         "source": verdict.source,
-        "laboratory": config.laboratory,
-        "ball": config.ball,
-        "serial": config.serial,
+        **{key: getattr(config, key) for key in OF_THE_CONFIGURATION},
         "date": _dates([config.date] if config.date else [o.date for o in recording.origins]),
-        "temperature": config.temperature,
         "instruments": [vars(item) for item in config.instruments],
         "report": {
             **vars(config.report),
             "accreditation_mark": Path(config.report.accreditation_mark).name,
         },
         "properties": vars(config.properties),
-        "mass": config.mass,
-        "height": config.height,
-        "mass_uncertainty": config.mass_uncertainty,
-        "height_uncertainty": config.height_uncertainty,
         "calibration_uncertainty": recording.calibration_uncertainty,
         "verdict": verdict.conforms,
         "confidence": CONFIDENCE,
@@ -106,12 +105,8 @@ def report_data(recording: Recording) -> dict[str, Any]:
         "notes": [_note(note) for note in recording.own_notes],
         "files": [
             {
-                "name": origin.name,
+                **{key: getattr(origin, key) for key in OF_A_FILE},
                 "sha256": origin.checksum,
-                "date": origin.date,
-                "calibration": origin.calibration,
-                "sample_rate": origin.sample_rate,
-                "drops": origin.drops,
                 "notes": [_note(note) for note in origin.notes],
             }
             for origin in recording.origins

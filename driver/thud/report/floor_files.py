@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from functools import partial
 from importlib.util import find_spec
-from textwrap import fill
 from typing import TYPE_CHECKING
 
 from thud.base._schema import RATED_BANDS
@@ -25,12 +24,10 @@ if TYPE_CHECKING:
 WORKBOOK = "predictions.xlsx"
 # Tables that are files too, not only sheets of the workbook; the last is part of the report.
 _TABLES = ("bands", "octaves", "ratings", "contributions", "paths", "modes", "changes")
-# Maximum number of characters in a line on the screen.
-_WIDTH = 80
 
 
 def screen_text(floor: PredictedFloor) -> str:
-    """Return the ratings of a floor, and what makes them uncertain, in lines of 80 characters."""
+    """Return the ratings of a floor, and what makes them uncertain, as lines."""
     prediction, required = floor.prediction, floor.prediction.requirement
     (title, _, _, text), *others = floor.ratings
     octaves = zip(RATED_BANDS["octave"], prediction.octave_level, strict=True)
@@ -45,10 +42,7 @@ def screen_text(floor: PredictedFloor) -> str:
         "  Contributions to the standard uncertainty, dB:",
         *(f"    {value:.1f}  {name}" for name, value in floor.contributions.items()),
     ]
-    return "\n".join(
-        fill(line, _WIDTH, subsequent_indent="    ") if len(line) > _WIDTH else line
-        for line in lines
-    )
+    return "\n".join(lines)
 
 
 def file_names(files: Iterable[str], *, report: bool = True) -> list[str]:

@@ -29,13 +29,11 @@ if TYPE_CHECKING:
 def floor_page(floor: PredictedFloor, section: bytes, figure: bytes) -> str:
     """Return the page as self-contained HTML, with the section and the levels as SVG."""
     prediction = floor.prediction
-    title = f"Predicted impact sound: {floor.name}"
     octave_levels = (number_text(level, ".1f") for level in prediction.octave_level)
     errors = getattr(prediction.source, "level_error", np.array(np.nan))
     return render(
         "report/floor.html",
-        title=title,
-        identity=title,
+        title=f"Predicted impact sound: {floor.name}",
         version=version(),
         floor=floor,
         prediction=prediction,

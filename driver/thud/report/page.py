@@ -42,15 +42,8 @@ STANDARDS = {
 # Construction that the standards give as an example, without limits.
 EXAMPLES = {"diameter": 0.18, "wall_thickness": 0.03}
 BUDGET_HEAD = (
-    "Contribution",
-    "Type",
-    "Value",
-    "Divisor",
-    "Sensitivity",
-    "u",
-    "Degrees of freedom",
-    "Share",
-)
+    "Contribution", "Type", "Value", "Divisor", "Sensitivity", "u", "Degrees of freedom", "Share",
+)  # fmt: skip
 # Minimum share of the variance of a contribution that the page lists.
 MIN_SHARE = 0.0005
 # Horizontal positions of the limits in the picture of a criterion, and of its ends.
@@ -105,7 +98,7 @@ def report_page(
         figures=[*figures],
         drops=drop_table(data),
         budget_head=BUDGET_HEAD,
-        budgets=[_budget(criterion) for criterion in criteria if _has_budget(criterion)],
+        budgets=[_budget(c) for c in criteria if c["uncertainty"] and c["value"] is not None],
         without_budget=", ".join(
             quantity_of(criterion).title
             for criterion in criteria
@@ -118,27 +111,21 @@ def report_page(
 
 
 def _about(data: dict[str, Any]) -> dict[str, str]:
-    """Return what is known of laboratory, client and item; [report] only where it is stated."""
+    """Return what is stated of laboratory, client and item."""
     report = data["report"]
-    stated = {
+    return _stated({
+        "Laboratory": data["laboratory"] or NOT_KNOWN,
         "Address": "\n".join(report["address"]),
         "Accreditation": report["accreditation"],
         "Client": "\n".join(report["client"]),
-    }
-    item = {
+        "Ball": data["ball"] or NOT_KNOWN,
+        "Serial number": data["serial"] or NOT_KNOWN,
         "Item": report["item"],
         "State of the item": report["state"],
         "Received on": report["received"],
-    }
-    return {
-        "Laboratory": data["laboratory"] or NOT_KNOWN,
-        **_stated(stated),
-        "Ball": data["ball"] or NOT_KNOWN,
-        "Serial number": data["serial"] or NOT_KNOWN,
-        **_stated(item),
         "Measured on": data["date"] or NOT_KNOWN,
-        **_stated({"Issued on": report["issued"]}),
-    }
+        "Issued on": report["issued"],
+    })  # fmt: skip
 
 
 def _stated(pairs: dict[str, str]) -> dict[str, str]:
@@ -147,7 +134,7 @@ def _stated(pairs: dict[str, str]) -> dict[str, str]:
 
 
 def _measured(data: dict[str, Any]) -> dict[str, str]:
-    """Return where, how and with what the drops were measured."""
+    """Return what is stated on where, how and with what the drops were measured."""
     files, drops, report = data["files"], len(data["drops"]), data["report"]
     rates = sorted({file["sample_rate"] for file in files})
     range_text = " to ".join(dict.fromkeys(f"{rate / 1e3:.4g}" for rate in (rates[0], rates[-1])))
@@ -155,20 +142,17 @@ def _measured(data: dict[str, Any]) -> dict[str, str]:
     relative = data["calibration_uncertainty"]
     uncertainty = "uncertainty not stated" if relative is None else f"u = {100 * relative:.2g} %"
     pressure = report["pressure"]
-    before = {key.capitalize(): report[key] for key in ("place", "procedure", "deviations")}
-    air = {
+    amount = f"{_count(drops, 'drop')} in {_count(len(files), 'file')}, {range_text} kHz"
+    return _stated({
+        **{key.capitalize(): report[key] for key in ("place", "procedure", "deviations")},
+        "Temperature": _number_text(data["temperature"], 1, "°C") or NOT_KNOWN,
         "Humidity": _number_text(report["humidity"], 0, "%"),
         "Air pressure": _number_text(pressure and pressure / 100, 0, "hPa"),
-    }
-    return {
-        **_stated(before),
-        "Temperature": _number_text(data["temperature"], 1, "°C") or NOT_KNOWN,
-        **_stated(air),
-        "Recordings": f"{_count(drops, 'drop')} in {_count(len(files), 'file')}, {range_text} kHz",
+        "Recordings": amount,
         "Calibration": f"{'; '.join(calibrations) or NOT_KNOWN}; {uncertainty}",
         "Instruments": "\n".join(map(_instrument, data["instruments"])) or NOT_KNOWN,
-        **_stated({"Traceability": report["traceability"]}),
-    }
+        "Traceability": report["traceability"],
+    })  # fmt: skip
 
 
 def _number_text(value: float | None, decimals: int, unit: str) -> str:
@@ -199,11 +183,6 @@ def _properties(properties: dict[str, Any]) -> list[str]:
     lines += [f"{name} {properties[name]}" for name in ("hardness", "surface") if properties[name]]
     temperature = _number_text(properties["temperature"], 1, "°C")
     return [*lines, f"temperature {temperature}"] if temperature else lines
-
-
-def _has_budget(criterion: dict[str, Any]) -> bool:
-    known = any(part["uncertainty"] for part in criterion["contributions"])
-    return known and bool(criterion["uncertainty"]) and criterion["value"] is not None
 
 
 def _budget(criterion: dict[str, Any]) -> tuple[str, list[tuple[str, ...]]]:

@@ -153,7 +153,7 @@ def save(
         contents |= figure_files({STAGES: stages.plot()})
     earlier = _checksums_in(folder)
     paths = results.write(contents)
-    if earlier not in (None, _checksums(data)):
+    if earlier not in (None, [file["sha256"] for file in data["files"]]):
         message = f"{folder}: replaces the results of another recording"
         warnings.warn(message, ReportWarning, stacklevel=3)
     return paths
@@ -198,14 +198,10 @@ def read_picture(path: Path) -> tuple[str, bytes]:
     return kind, content
 
 
-def _checksums(data: dict[str, Any]) -> list[str]:
-    return [file["sha256"] for file in data["files"]]
-
-
 def _checksums_in(folder: Path) -> list[str] | None:
     """Return the checksums of the files of an earlier report; None if there is none."""
     try:
         data = json.loads(read_input(folder / JSON))
-        return _checksums(data) if data["format"] == FORMAT else None
+        return [file["sha256"] for file in data["files"]] if data["format"] == FORMAT else None
     except (OSError, ValueError, RecursionError, KeyError, TypeError):
         return None
