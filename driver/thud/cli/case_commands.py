@@ -30,7 +30,6 @@ from thud.cli.command import (
     flag,
     kind_of,
     message_of,
-    number,
     option,
     output,
     results_of,

@@ -12,7 +12,6 @@ import numpy as np
 from thud.base._schema import (
     KEYS,
     RATED_BANDS,
-    LaminateFloor,
     MeasuredMobility,
     ModalFloor,
     Room,

@@ -195,7 +195,7 @@ def _verdict(
 ) -> Verdict:
     """Return the verdict by the criteria of drops, of which the first is that of the case."""
     first, drops = values[0].tolist(), values[1:]
-    plain = assess_levels(first[:5], *first[5:], case.limits.source)
+    plain = assess_levels(first[:5], *first[5:], source=case.limits.source)
     limits = np.array([(criterion.lower, criterion.upper) for criterion in plain.criteria])
     inside = (drops >= limits[:, 0]) & (drops <= limits[:, 1])
     criteria = tuple(
