@@ -113,8 +113,8 @@ def _fields() -> Iterator[Field]:
             choices = {word: humanize(word) for word in check.keywords["allowed"]}
             yield Field(name, label, "choice", choices=choices, folded=name in FOLDED)
         else:
-            is_fraction = title.startswith("relative ")
-            unit = PERCENT if is_fraction else check.keywords.get("unit", "")
+            # Uncertainties without a unit are relative.
+            unit = check.keywords.get("unit") or (PERCENT if key.endswith("uncertainty") else "")
             label = ", ".join(filter(None, (label, unit)))
             yield Field(name, label, unit=unit, folded=name in FOLDED)
 

@@ -194,8 +194,11 @@ def _verdict(
     case: Case, columns: Columns, values: Values, fixed: tuple[str, ...], notes: tuple[Note, ...]
 ) -> Verdict:
     """Return the verdict by the criteria of drops, of which the first is that of the case."""
-    first, drops = values[0].tolist(), values[1:]
-    plain = assess_levels(first[:5], *first[5:], source=case.limits.source)
+    octaves, (time, restitution, peaks, mass, height) = np.split(values[0], [5])
+    drops = values[1:]
+    plain = assess_levels(
+        octaves, time, restitution, peaks, mass, height, source=case.limits.source
+    )
     limits = np.array([(criterion.lower, criterion.upper) for criterion in plain.criteria])
     inside = (drops >= limits[:, 0]) & (drops <= limits[:, 1])
     criteria = tuple(
