@@ -10,6 +10,7 @@ from thud.base.checks import refuse
 from thud.case.case import Case
 from thud.case.keys import value_in
 from thud.level.rating import excess_level
+from thud.studies.parameter import NUMERIC_KINDS
 from thud.studies.run import compute
 from thud.studies.study_result import SampleResult
 
@@ -90,7 +91,7 @@ class Design(SampleResult):
 
     @property
     def room_rating(self) -> xr.DataArray | None:
-        """The rating `rating_name` of the levels in the room, dB; None without a room."""
+        """The rating that the room states, of the levels in it, dB; None without a room."""
         return self.dataset.get("room_rating")
 
     def rows(self) -> list[tuple[str, ...]]:
@@ -167,4 +168,5 @@ def design(
 
 
 def _is_axis(parameter: Parameter) -> bool:
-    return parameter.numeric and (parameter.values is None or len(set(parameter.values)) > 1)
+    values = parameter.values
+    return parameter.key.kind in NUMERIC_KINDS and (values is None or len(set(values)) > 1)

@@ -89,11 +89,6 @@ class Parameter(Plain):
     key: Key = field(default=Key("", "", ""), repr=False)
 
     @property
-    def numeric(self) -> bool:
-        """Whether the values are numbers."""
-        return self.key.kind in NUMERIC_KINDS
-
-    @property
     def coordinate_name(self) -> str:
         """Name of its coordinate in datasets."""
         return coordinate_name(self.name, self.key)

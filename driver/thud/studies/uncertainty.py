@@ -43,9 +43,9 @@ class Uncertainty(SampleResult):
     def __post_init__(self) -> None:
         """Raise InputError if fewer than two samples have results."""
         if self.computed < 2:  # noqa: PLR2004 - a spread needs two
-            reason = next((f" ({text})" for text in self.dataset["reason"].values if text), "")
-            count = self.dataset["status"].size
-            refuse(f"only {self.computed} of {count} samples have results{reason}", "two or more")
+            reasons = [text for text in self.dataset["reason"].values if text]
+            count = f"only {self.computed} of {self.dataset.sizes['sample']} samples have results"
+            refuse(f"{count} ({reasons[0]})" if reasons else count, "two or more")
 
     @classmethod
     def check(cls, study: Study) -> None:
@@ -61,10 +61,14 @@ class Uncertainty(SampleResult):
         return f"<Uncertainty, {self.source}: {self.conforming} of {self.computed} samples conform>"
 
     @property
+    def samples(self) -> xr.Dataset:
+        """Samples that have results."""
+        return self.dataset.isel(sample=np.flatnonzero(self.dataset["status"] == 0))
+
+    @property
     def levels(self) -> NDArray[np.float64]:
-        """Octave levels of the assessed force, dB, shape (n_sample, 5); not of failed samples."""
-        levels = self.dataset[f"{self.dataset.attrs['assessed_force']}_octave"]
-        return np.asarray(levels.values[self._is_computed])
+        """Octave levels of the assessed force of these samples, dB, shape (n_sample, 5)."""
+        return np.asarray(self.samples[f"{self.dataset.attrs['assessed_force']}_octave"])
 
     @property
     def source(self) -> LimitsSource:
@@ -75,21 +79,12 @@ class Uncertainty(SampleResult):
     @property
     def conforming(self) -> int:
         """Number of samples that meet all criteria."""
-        return int(self.dataset["conforms"].values[self._is_computed].sum())
+        return int(self.samples["conforms"].sum())
 
     @property
     def computed(self) -> int:
         """Number of samples that have results."""
-        return int(self._is_computed.sum())
-
-    @property
-    def failed(self) -> int:
-        """Number of samples that have no results."""
-        return int((~self._is_computed).sum())
-
-    @property
-    def _is_computed(self) -> NDArray[np.bool_]:
-        return np.asarray(self.dataset["status"].values == 0)
+        return self.samples.sizes["sample"]
 
     @property
     def probability(self) -> float:
@@ -128,7 +123,7 @@ class Uncertainty(SampleResult):
             share = np.mean((level >= lower[i]) & (level <= upper[i]))
             rows.append((f"{band:g}", *_spread(level), f"{100 * share:.1f} %"))
         if "room_rating" in self.dataset:
-            rating = self.dataset["room_rating"].to_numpy()[self._is_computed]
+            rating = self.samples["room_rating"].to_numpy()
             rows.append(("rating of the room", *_spread(rating), ""))
         low, high = self.interval
         probability = f"{100 * self.probability:.1f} %", f"± {100 * self.standard_error:.1f} %"
