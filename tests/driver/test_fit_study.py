@@ -55,6 +55,7 @@ def test_studies_of_the_repository(
         "fit.json",
         "fit.svg",
         "fitted.nml",
+        "thud.txt",
     ]
     saved = json.loads((folder / "fit.json").read_text())
     case = thud.read_case(folder / "fitted.nml")
