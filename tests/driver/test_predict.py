@@ -352,9 +352,9 @@ def test_command_prints_and_writes(
     assert max(map(len, printed.partition("Results:")[0].splitlines())) <= 80
     prediction = thud.predict_level(floor=case.floor, room=case.room)
     floor = PredictedFloor("my floor", "my_floor", prediction)
-    words = " ".join(printed.split())
-    assert " ".join(unmarked(screen_text(floor)).split()) in words
-    assert verdict_text(prediction) in words
+    shown = " ".join(printed.split())
+    assert " ".join(unmarked(screen_text(floor)).split()) in shown
+    assert verdict_text(prediction) in shown
     pages = ["my_floor.html", "concrete_140.html"]
     assert {*TABLES, "changes.csv", *pages} <= {*names_in(out)}
     # A report is removed only by a new one.

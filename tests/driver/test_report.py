@@ -37,7 +37,7 @@ from thud.recordings.response import Plate
 from thud.recordings.words import read_date
 from thud.report.contents import FIELDS, criteria_data, missing_fields, report_data
 from thud.report.notes import group_notes
-from thud.report.page import range_picture, report_page
+from thud.report.page import BUDGET_HEAD, range_picture, report_page
 from thud.report.pdf import html_to_pdf, missing_characters
 from thud.report.recording_files import file_names, read_picture, table, write_report
 from thud.report.rows import criterion_row, drop_table, excluded_text, freedom_text, risk_text
@@ -261,8 +261,11 @@ def test_signature_is_on_a_page_with_the_last_notes(one: Recording, tmp_path: Pa
 @pytest.mark.slow
 def test_browser_prints_the_same_page(written: tuple[Recording, Path]) -> None:
     _, folder = written
+    # The table of budgets repeats its head where it breaks, which engines do at other rows.
+    head = "".join(BUDGET_HEAD).replace(" ", "")
     words = [
-        re.sub(r"\s", "", text_of(path)) for path in (folder / "report.pdf", print_page(folder))
+        re.sub(r"\s", "", text_of(path)).replace(head, "")
+        for path in (folder / "report.pdf", print_page(folder))
     ]
     # Figures are laid out letter by letter; the order of their words may differ.
     assert sorted(words[0]) == sorted(words[1])
