@@ -157,7 +157,8 @@ export function openDoor(door, { focus = false } = {}) {
     if (name === door && focus) tab.focus();
   }
   byId("panel").setAttribute("aria-labelledby", `door_${door}`);
-  setFragment(door);
+  // Not the name alone, which an element has that the browser would then scroll to.
+  setFragment(`door=${door}`);
   document.body.dataset.door = door;
   changePage(() => buildDoor(formHandlers));
   hideMessage();

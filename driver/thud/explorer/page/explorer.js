@@ -52,7 +52,7 @@ function takeLink(text) {
 function onAddress() {
   const parameters = takeFragment();
   hideMessage();
-  const door = DOORS.find((name) => parameters.has(name));
+  const door = DOORS.find((name) => name === parameters.get("door"));
   if (parameters.has("case")) takeLink(parameters.get("case"));
   else if (door) openDoor(door);
   else reconnect();
@@ -171,7 +171,7 @@ async function main() {
   listen();
   holdForClicks();
   const link = fragment.get("case");
-  const door = DOORS.find((name) => fragment.has(name));
+  const door = DOORS.find((name) => name === fragment.get("door"));
   if (firstVariant) current[firstVariant.door] = firstVariant;
   const isRestored = restoreStored();
   if (isRestored) openDoor(door ?? state.door);

@@ -13,7 +13,7 @@ function findFirst() {
   if (!content || fragment.has("case") || !stored("token")) return null;
   const own = storedCase();
   const variant = own ? own.start === "{}" && own.shown : { door: "ball", style: 0, label: "Standard ball", ...content };
-  const isOther = ["recording", "ball", "floor"].some((door) => fragment.has(door) && door !== variant?.door);
+  const isOther = fragment.has("door") && fragment.get("door") !== variant?.door;
   return variant && !isOther ? { ...variant, isPartial: true } : null;
 }
 

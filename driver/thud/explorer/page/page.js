@@ -52,10 +52,10 @@ export function numberProblem(text, unit = "") {
   return `enter a number${unit ? `, in ${unit}` : ""}`;
 }
 
-/** Return the text of a number in a unit, without it: levels with two decimals, others with four digits. */
+/** Return the text of a number in a unit, without it: levels with two decimals, others with four digits, below 1 with three. */
 export function digits(value, unit = "") {
   if (value === null || value === undefined) return "not known";
-  return minus(unit === "dB" ? value.toFixed(2) : Number(value.toPrecision(4)));
+  return minus(unit === "dB" ? value.toFixed(2) : Number(value.toPrecision(Math.abs(value) < 1 ? 3 : 4)));
 }
 
 /** Return the text of a number with its unit. */
@@ -66,12 +66,14 @@ export function rounded(value, unit = "") {
 /** Return the text of a number with its sign: levels with `decimals` decimals, others with two digits. */
 export function signed(value, unit = "", decimals = 2) {
   const size = Math.abs(value);
-  return `${value < 0 ? "−" : "+"}${unit === "dB" ? size.toFixed(decimals) : Number(size.toPrecision(2))}`;
+  const text = unit === "dB" ? size.toFixed(decimals) : String(Number(size.toPrecision(2)));
+  if (!Number(text)) return `±${text}`;
+  return `${value < 0 ? "−" : "+"}${text}`;
 }
 
-/** Return the text of a number with a typographic minus sign. */
+/** Return the text of a number with a typographic minus sign, which a rounded zero has not. */
 export function minus(value) {
-  return String(value).replace("-", "−");
+  return String(value).replace(/^-(?=[0.]*$)/, "").replace("-", "−");
 }
 
 export function capitalize(text) {
