@@ -133,13 +133,6 @@ def test_case_says_the_modes_that_were_computed() -> None:
     assert hash(model) == hash(thud.MeasuredModes(frequency=(60, 110), **others))
 
 
-def test_changed_list_changes_no_case() -> None:
-    points = [1.0, 2.0]
-    case = thud.Case(floor=thud.Plate(point_x=points, point_y=points))
-    points[0] = 3.0
-    assert case == thud.Case(floor=thud.Plate(point_x=(1.0, 2.0), point_y=(1.0, 2.0)))
-
-
 def test_arrays_of_results_are_copied_once() -> None:
     many = thud.solve_many({"height": [0.5, 1.0]}, forces=True)
     assert many.elastic_force.base is many.floor_force.base
