@@ -106,13 +106,6 @@ def test_a_table_has_one_list_of_columns(flagship: thud.Impact) -> None:
         assert len(data.data_vars) == len(table.columns) - 1
 
 
-def test_unknown_criteria_are_not_met(flagship: thud.Impact) -> None:
-    record = recorded(flagship)
-    cells = {row[0]: row for row in record.assess().rows()}
-    assert (cells["restitution"][1], cells["restitution"][-1]) == ("", "undecided")
-    assert cells["all criteria"][-1] == "undecided"
-
-
 def test_warnings_are_shown() -> None:
     with pytest.warns(thud.PlausibilityWarning):
         odd = thud.solve(thud.Ball(mass=0.5, youngs_modulus=1e5))
