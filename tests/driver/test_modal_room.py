@@ -93,7 +93,6 @@ def test_mean_of_positions_is_the_modal_level_of_the_prediction(shell: thud.Impa
         ),
         ({"room": thud.Room(length=5.0, width=3.0)}, naming("length", 5.0, 4.5)),
         ({"room": thud.Room(corner_y=2.0, width=2.0)}, naming("corner_y", 4.0, 3.7)),
-        ({"room": thud.Room(volume=-1.0)}, naming("&room: volume", "-1.0")),
     ],
 )
 def test_what_has_no_modal_answer_is_refused(
