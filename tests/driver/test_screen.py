@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from conftest import CaseFile
 
-FLOORS = sorted((REPOSITORY / "inputs/floors").glob("*.nml"))
+FLOORS = {path.stem: path for path in sorted((REPOSITORY / "inputs/floors").glob("*.nml"))}
 CONTROL = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 COLOR_ENDS = "\x1b[0m"
 # Numbers that are nothing but zeros, and negative zeros.
@@ -140,26 +140,21 @@ def test_screens_of_commands_have_80_columns(name: str, workplace: Path) -> None
 
 
 @pytest.mark.parametrize(
-    "path", [*INPUTS[:3], *(pytest.param(p, marks=pytest.mark.slow) for p in INPUTS[3:])],
-    ids=lambda path: path.stem,
+    "path", [*INPUTS[:3], FLOORS["joists"], *(
+        pytest.param(p, marks=pytest.mark.slow)
+        for p in [*INPUTS[3:], *(path for name, path in FLOORS.items() if name != "joists")]
+    )], ids=lambda path: path.stem,
 )  # fmt: skip
 def test_screens_of_runs_have_80_columns(path: Path, executable: str, workplace: Path) -> None:
     case = path.relative_to(REPOSITORY)
     for verbose in ([], ["--verbose"]):
-        check_screen(on_terminal(executable, case, *verbose, folder=workplace))
+        printed = on_terminal(executable, case, *verbose, folder=workplace)
+        check_screen(printed)
+        if path in FLOORS.values():
+            assert "E+0" not in printed
+            assert re.search(r"velocity of the floor +\d", printed)
     run = (sys.executable, "-m", "thud", "run", "--no-figures", case)
     check_screen(on_terminal(*run, folder=workplace))
-
-
-@pytest.mark.parametrize(
-    "path", [p if p.stem == "joists" else pytest.param(p, marks=pytest.mark.slow) for p in FLOORS],
-    ids=lambda path: path.stem,
-)  # fmt: skip
-def test_screens_of_floors_have_80_columns(path: Path, executable: str, workplace: Path) -> None:
-    printed = on_terminal(executable, path.relative_to(REPOSITORY), folder=workplace)
-    check_screen(printed)
-    assert "E+0" not in printed
-    assert re.search(r"velocity of the floor +\d", printed)
 
 
 @pytest.mark.parametrize("option", ["--help", "--keys", "--nonsense"])

@@ -67,7 +67,7 @@ def _print_message(message: str, color: int) -> None:
     if is_terminal(sys.stderr):
         text = wrap(text)
     if _has_colors(sys.stderr):
-        text = text.replace(name, _colored(name, color), 1)
+        text = text.replace(name, f"{_sequence(color)}{name}{_sequence(0)}", 1)
     tqdm.write(text, file=sys.stderr)
 
 
@@ -75,10 +75,6 @@ def _has_colors(stream: TextIO) -> bool:
     """Whether a stream is a terminal with colors, and the user wants them (no-color.org)."""
     wanted = not os.environ.get("NO_COLOR") and os.environ.get("TERM", "dumb") not in {"", "dumb"}
     return wanted and is_terminal(stream)
-
-
-def _colored(text: str, color: int) -> str:
-    return f"{_sequence(color)}{text}{_sequence(0)}"
 
 
 def _sequence(color: int) -> str:
