@@ -78,9 +78,16 @@ def floor_answer(impact: Impact, on_floor: FloorImpact) -> Answer:
 
 
 def room_answer(prediction: RoomPrediction) -> Answer:
-    """Return levels in the room below, dB, the room, m, m3 and s, and ratings with uncertainty."""
+    """Return levels in the room below, dB, the room, m, m3 and s, and ratings with uncertainty.
+
+    Sides of a room that are not known are 0.
+    """
     room, floor = prediction.room, prediction.floor
-    length, width = (getattr(room, side) or getattr(floor, side) for side in ("length", "width"))
+    # Modes of a file have no sides.
+    length, width = (
+        getattr(room, side) or getattr(floor, side, 0.0) for side in ("length", "width")
+    )
+    height = prediction.volume / (length * width) if length and width else 0.0
     return {
         "frequency": to_json(prediction.frequency),
         "level": to_json(prediction.level),
@@ -92,7 +99,7 @@ def room_answer(prediction: RoomPrediction) -> Answer:
         "size": {
             "length": length,
             "width": width,
-            "height": room.height or prediction.volume / (length * width),
+            "height": room.height or height,
             "volume": prediction.volume,
             "reverberation_time": float(np.mean(prediction.reverberation_time)),
         },

@@ -24,8 +24,9 @@ function draw({ radius, height, layers }, size, names) {
   const scale = Math.min(SCALE, MAX_HEIGHT / total);
   const top = 2 * radius * scale + FALL + 4;
   const bottom = top + total * scale;
-  const texts = size ? [`${rounded(size.length)} × ${rounded(size.width)} × ${rounded(size.height, "m")}`,
-    rounded(size.volume, "m³"), `reverberation time ${rounded(size.reverberation_time, "s")}`] : [];
+  const sides = size ? [size.length, size.width, size.height] : [];
+  const texts = size ? [sides.every(Boolean) ? `${sides.map((side) => rounded(side)).join(" × ")} m` : "",
+    rounded(size.volume, "m³"), `reverberation time ${rounded(size.reverberation_time, "s")}`].filter(Boolean) : [];
   const words = `Dropped from ${rounded(height, "m")} on ${names.join(", ")}`;
   const image = svgElement("svg", {
     width: WIDTH + 40, height: bottom + (size ? ROOM : 0) + 8, role: "img",
