@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import math
-from argparse import ArgumentParser
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -17,7 +16,8 @@ from synthetic import make_recording
 
 import thud
 from thud.base.note import Note
-from thud.cli.case_commands import EXPORT, KINDS
+from thud.cli import COMMANDS, new_parser
+from thud.cli.case_commands import KINDS
 from thud.export.force_files import EXPORTS, BlockedForce, blocked_force
 from thud.recordings.read_recording import read_recording
 
@@ -34,11 +34,7 @@ CASE = str(REPOSITORY / "inputs/rubber_ball_100cm.nml")
 
 def export(*words: str) -> int:
     """Run the command as the driver does."""
-    parser = ArgumentParser()
-    for names, settings in EXPORT.arguments:
-        parser.add_argument(*names, **settings)
-    parser.set_defaults(name="export")
-    return EXPORT.function(parser.parse_args(words))
+    return COMMANDS["export"].function(new_parser().parse_args(["export", *words]))
 
 
 def half_sine(rate: float, start: float = 0.0) -> BlockedForce:

@@ -12,22 +12,23 @@ from thud.base.bridge import version
 from thud.base.checks import refuse, suggestion
 from thud.base.errors import InputError, NumericalError, ThudError
 from thud.base.tables import wrap
-from thud.cli.case_commands import ASSESS, COMPARE, EXAMPLES, EXPORT, RUN
+from thud.cli import (  # noqa: F401 - the modules of the commands
+    case_commands,
+    explore_command,
+    floor_commands,
+    recording_commands,
+    study_commands,
+)
 from thud.cli.command import (
+    COMMANDS,
     FILE_KINDS,
-    Command,
+    FINISHED_ARE_KEPT,
     exit_code,
     kind_of,
     message_of,
     print_immediately,
 )
-from thud.cli.explore_command import EXPLORE
-from thud.cli.fit_command import FIT
-from thud.cli.floor_commands import FLOOR, LISTEN, MOBILITY, PREDICT, RATE
-from thud.cli.recording_commands import CALIBRATE, HISTORY, MEASURE
 from thud.cli.screen import is_terminal, print_error
-from thud.cli.study_commands import study_commands
-from thud.cli.surrogate_command import SURROGATE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -37,30 +38,10 @@ if TYPE_CHECKING:
 # Exit code after a signal: this plus the number of the signal.
 INTERRUPTED = 128
 
-COMMANDS = {
-    "run": RUN,
-    "assess": ASSESS,
-    "compare": COMPARE,
-    "explore": EXPLORE,
-    "measure": MEASURE,
-    "calibrate": CALIBRATE,
-    "export": EXPORT,
-    "history": HISTORY,
-    "rate": RATE,
-    "floor": FLOOR,
-    "listen": LISTEN,
-    "predict": PREDICT,
-    "mobility": MOBILITY,
-    **study_commands(),
-    "surrogate": SURROGATE,
-    "fit": FIT,
-    "examples": EXAMPLES,
-}
-
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command with arguments, by default those of this process; return the exit code."""
-    after_interrupt = Command._field_defaults["after_interrupt"]
+    after_interrupt = FINISHED_ARE_KEPT
     try:
         options = _parse(sys.argv[1:] if arguments is None else arguments)
         if isinstance(options, int):

@@ -21,8 +21,8 @@ from thud.cli.command import (
     NO_FIGURES,
     NOT_CONFORMING,
     QUIET,
-    Command,
     argument,
+    command,
     exit_code,
     file_of,
     files,
@@ -47,6 +47,25 @@ if TYPE_CHECKING:
     from thud.recordings.recording import ImpactResult
 
 
+@command(
+    "run",
+    "run cases, write their results and figures",
+    files("cases", "CASE.nml", "namelist files", "case", nargs="+"),
+    *output(
+        "the results; several cases have a subdirectory each (default: outputs/<case name>)"
+    ),
+    flag("--check", "exit with 3 unless all sources conform with the values of their cases "
+         "(assess --check: over what is not known)"),
+    NO_FIGURES,
+    argument("--format", choices=("svg", "png", "pdf"), default="svg",
+             help="format of the figures (default: svg)"),
+    flag("--all", "also write quantities of the model against time (model_histories.csv) and "
+         "every figure"),
+    flag("--animation", "also write motion.gif of cases with snapshots"),
+    argument("-v", "--verbose", action="store_true",
+             help="also show numbers of the solver: resolution, quantities of the model"),
+    QUIET,
+)  # fmt: skip
 def run_cases(options: argparse.Namespace) -> int:
     """Run all cases, even if one fails; return the exit code."""
     if options.verbose and options.quiet:
@@ -109,29 +128,15 @@ def _run_case(path: str, options: argparse.Namespace) -> bool:
     return bool(answer["conforms"])
 
 
-RUN = Command(
-    "run cases, write their results and figures",
-    (
-        files("cases", "CASE.nml", "namelist files", "case", nargs="+"),
-        *output(
-            "the results; several cases have a subdirectory each (default: outputs/<case name>)"
-        ),
-        flag("--check", "exit with 3 unless all sources conform with the values of their cases "
-             "(assess --check: over what is not known)"),
-        NO_FIGURES,
-        argument("--format", choices=("svg", "png", "pdf"), default="svg",
-                 help="format of the figures (default: svg)"),
-        flag("--all", "also write quantities of the model against time (model_histories.csv) and "
-             "every figure"),
-        flag("--animation", "also write motion.gif of cases with snapshots"),
-        argument("-v", "--verbose", action="store_true",
-                 help="also show numbers of the solver: resolution, quantities of the model"),
-        QUIET,
-    ),
-    run_cases,
+@command(
+    "assess",
+    "assess a case over what is not known of its source",
+    files("case", "CASE.nml", "namelist file", "case"),
+    *output("the verdict (default: outputs/<case name>_verdict)"),
+    flag("--check", "exit with 3 unless the source conforms over what is not known of it "
+         "(run --check: with the values of the case)"),
+    QUIET,
 )  # fmt: skip
-
-
 def assess_case(options: argparse.Namespace) -> int:
     """Assess a case over what is not known of its source; return the exit code."""
     from thud.studies.calibrated_set import assess
@@ -143,19 +148,6 @@ def assess_case(options: argparse.Namespace) -> int:
     shown = "\n".join([format_rows(verdict.rows()), *(note.message for note in verdict.notes)])
     contents = {"verdict.csv": verdict.to_csv().encode()}
     return finish(options, results, contents, shown, verdict=verdict)
-
-
-ASSESS = Command(
-    "assess a case over what is not known of its source",
-    (
-        files("case", "CASE.nml", "namelist file", "case"),
-        *output("the verdict (default: outputs/<case name>_verdict)"),
-        flag("--check", "exit with 3 unless the source conforms over what is not known of it "
-             "(run --check: with the values of the case)"),
-        QUIET,
-    ),
-    assess_case,
-)  # fmt: skip
 
 
 def _figures(answer: Bundle, options: argparse.Namespace) -> dict[str, bytes]:
@@ -185,6 +177,19 @@ def _figures(answer: Bundle, options: argparse.Namespace) -> dict[str, bytes]:
     return contents
 
 
+@command(
+    "compare",
+    "compare models and recordings of the same drop on one page",
+    files("cases", "CASE.nml|RECORD.csv", "namelist files, and recordings with columns of "
+          "time, s, and force, N", "case", "recording", nargs="+"),
+    *output("the page (default: outputs/comparison)"),
+    argument("--force", choices=FORCES,
+             help="force to compare (default: &levels force of each case)"),
+    argument("--source", choices=SOURCES,
+             help="source of the limits (default: &limits source of the cases)"),
+    QUIET,
+    after_interrupt="nothing is written",
+)  # fmt: skip
 def compare_cases(options: argparse.Namespace) -> int:
     """Compare cases and recordings; return the exit code."""
     from thud.comparison import comparison
@@ -197,23 +202,6 @@ def compare_cases(options: argparse.Namespace) -> int:
     return finish(options, results, page.files(), format_rows(page.rows()), page.warnings)
 
 
-COMPARE = Command(
-    "compare models and recordings of the same drop on one page",
-    (
-        files("cases", "CASE.nml|RECORD.csv", "namelist files, and recordings with columns of "
-              "time, s, and force, N", "case", "recording", nargs="+"),
-        *output("the page (default: outputs/comparison)"),
-        argument("--force", choices=FORCES,
-                 help="force to compare (default: &levels force of each case)"),
-        argument("--source", choices=SOURCES,
-                 help="source of the limits (default: &limits source of the cases)"),
-        QUIET,
-    ),
-    compare_cases,
-    "nothing is written",
-)  # fmt: skip
-
-
 # Help of the options that choose formats.
 KINDS = {
     "wav": "32-bit floats, with their scale in the comment",
@@ -224,6 +212,16 @@ KINDS = {
 }
 
 
+@command(
+    "export",
+    "write the blocked force of a case or a recording for other programs",
+    files("source", "CASE.nml|RECORDING", "namelist file, or recording", "case", "recording"),
+    *(flag(f"--{kind}", meaning) for kind, meaning in KINDS.items()),
+    *output("the files (default: outputs/<name>_export)"),
+    option("--drop", "N", "index of the drop in a recording (default: 1)", type=int, default=1),
+    option("--config", "LAB.toml", "configuration of a recording", type=file_of("TOML file")),
+    QUIET,
+)
 def run_export(options: argparse.Namespace) -> int:
     """Write the blocked force in the chosen formats; return the exit code."""
     from thud.export import force_files
@@ -251,20 +249,14 @@ def _read_source(path: str, config: str | None) -> ImpactResult:
     return compute(read_case(path))
 
 
-EXPORT = Command(
-    "write the blocked force of a case or a recording for other programs",
-    (
-        files("source", "CASE.nml|RECORDING", "namelist file, or recording", "case", "recording"),
-        *(flag(f"--{kind}", meaning) for kind, meaning in KINDS.items()),
-        *output("the files (default: outputs/<name>_export)"),
-        option("--drop", "N", "index of the drop in a recording (default: 1)", type=int, default=1),
-        option("--config", "LAB.toml", "configuration of a recording", type=file_of("TOML file")),
-        QUIET,
-    ),
-    run_export,
-)
-
-
+@command(
+    "examples",
+    "copy the inputs of the documentation: cases, studies, recordings, floors, constructions",
+    argument("directory", nargs="?", default="inputs", metavar="DIR",
+             help="new directory (default: inputs)"),
+    QUIET,
+    after_interrupt="copied files are kept",
+)  # fmt: skip
 def copy_examples(options: argparse.Namespace) -> int:
     """Copy the inputs into a directory of their own; return the exit code."""
     target = Path(options.directory)
@@ -281,15 +273,3 @@ def copy_examples(options: argparse.Namespace) -> int:
     if not options.quiet:
         print_path("Inputs", target)
     return 0
-
-
-EXAMPLES = Command(
-    "copy the inputs of the documentation: cases, studies, recordings, floors, constructions",
-    (
-        argument("directory", nargs="?", default="inputs", metavar="DIR",
-                 help="new directory (default: inputs)"),
-        QUIET,
-    ),
-    copy_examples,
-    "copied files are kept",
-)  # fmt: skip

@@ -22,10 +22,13 @@ if TYPE_CHECKING:
 
     from thud.level.assessment import Verdict
 
+    Function = Callable[[argparse.Namespace], int]
+
 # Exit code of `--check` if a source does not conform.
 NOT_CONFORMING = 3
 # Names or flags of an argument, and its keywords for `add_argument`.
 Argument = tuple[tuple[str, ...], dict[str, Any]]
+FINISHED_ARE_KEPT = "finished results are kept"
 
 
 class Command(NamedTuple):
@@ -34,8 +37,24 @@ class Command(NamedTuple):
     help: str
     arguments: tuple[Argument, ...]
     # Returns the exit code.
-    function: Callable[[argparse.Namespace], int]
-    after_interrupt: str = "finished results are kept"
+    function: Function
+    after_interrupt: str
+
+
+# All commands by their names, in the order of the help.
+COMMANDS: dict[str, Command] = {}
+
+
+def command(
+    name: str, meaning: str, *arguments: Argument, after_interrupt: str = FINISHED_ARE_KEPT
+) -> Callable[[Function], Function]:
+    """Make a function the command of a name; see `Command`."""
+
+    def add(function: Function) -> Function:
+        COMMANDS[name] = Command(meaning, arguments, function, after_interrupt)
+        return function
+
+    return add
 
 
 def argument(*names: str, **settings: object) -> Argument:
@@ -43,9 +62,9 @@ def argument(*names: str, **settings: object) -> Argument:
     return names, settings
 
 
-def flag(name: str, meaning: str) -> Argument:
+def flag(name: str, meaning: str, **settings: object) -> Argument:
     """Return an option without a value."""
-    return argument(name, action="store_true", help=meaning)
+    return argument(name, action="store_true", help=meaning, **settings)
 
 
 def option(name: str, value: str, meaning: str, **settings: object) -> Argument:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from thud.base.checks import refuse
 from thud.base.extras import require_extra
-from thud.cli.command import QUIET, Command, files, flag, option
+from thud.cli.command import QUIET, command, files, flag, option
 from thud.cli.screen import print_notes, print_path, print_results
 
 if TYPE_CHECKING:
@@ -27,6 +27,18 @@ LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 ALL_ADDRESSES = {"0.0.0.0": "localhost", "[::]": "[::1]"}  # noqa: S104 - only compared
 
 
+@command(
+    "explore",
+    "interactive page in a browser",
+    files("case", "CASE.nml|RESULTS", "case, or directory of results, to start with (default: "
+          "a standard ball)", "case", "directory", nargs="?"),
+    option("--host", "HOST", f"address to listen on (default: {LOOPBACK[0]}, this machine "
+           "only)", default=LOOPBACK[0]),
+    option("--port", "PORT", "port to listen on (default: any free port)", type=int, default=0),
+    flag("--no-browser", "only print the address"),
+    QUIET,
+    after_interrupt="nothing is written",
+)  # fmt: skip
 def explore(options: argparse.Namespace) -> int:
     """Serve the page until interrupted; return the exit code."""
     with require_extra("explorer"):
@@ -94,19 +106,3 @@ def _redirect(folder: Path, address: str) -> str:
     path.touch(0o600)
     path.write_text(f'<!doctype html><meta http-equiv="refresh" content="0; url={address}">')
     return path.as_uri()
-
-
-EXPLORE = Command(
-    "interactive page in a browser",
-    (
-        files("case", "CASE.nml|RESULTS", "case, or directory of results, to start with (default: "
-              "a standard ball)", "case", "directory", nargs="?"),
-        option("--host", "HOST", f"address to listen on (default: {LOOPBACK[0]}, this machine "
-               "only)", default=LOOPBACK[0]),
-        option("--port", "PORT", "port to listen on (default: any free port)", type=int, default=0),
-        flag("--no-browser", "only print the address"),
-        QUIET,
-    ),
-    explore,
-    "nothing is written",
-)  # fmt: skip

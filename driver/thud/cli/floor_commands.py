@@ -16,8 +16,8 @@ from thud.case.case import read_case
 from thud.cli.command import (
     NO_FIGURES,
     QUIET,
-    Command,
     argument,
+    command,
     figures_of,
     files,
     finish,
@@ -103,6 +103,16 @@ _FLOORS = (
 )  # fmt: skip
 
 
+@command(
+    "floor",
+    "compare floors and rooms of several cases and constructions on one page",
+    *_FLOORS,
+    option("--list", "WORDS", "only list the constructions of the library, all or those that "
+           "contain the words", nargs="?", const=""),
+    *output("the page (default: outputs/floors)"),
+    QUIET,
+    after_interrupt="nothing is written",
+)  # fmt: skip
 def compare_floor_cases(options: argparse.Namespace) -> int:
     """Compare floors, print the table and save the page; return the exit code.
 
@@ -121,20 +131,18 @@ def compare_floor_cases(options: argparse.Namespace) -> int:
     return finish(options, results, comparison.files(), shown, comparison.notes)
 
 
-FLOOR = Command(
-    "compare floors and rooms of several cases and constructions on one page",
-    (
-        *_FLOORS,
-        option("--list", "WORDS", "only list the constructions of the library, all or those that "
-               "contain the words", nargs="?", const=""),
-        *output("the page (default: outputs/floors)"),
-        QUIET,
-    ),
-    compare_floor_cases,
-    "nothing is written",
+@command(
+    "predict",
+    "level in the room below each floor, with its uncertainty, tables and a report",
+    *_FLOORS,
+    flag("--report", "also two pages for each floor (PDF, HTML), and what would change its "
+         "rating"),
+    option("--project", "TEXT", "project, on the first page of the report"),
+    option("--client", "TEXT", "client, on the first page of the report"),
+    *output("the results (default: outputs/prediction)"),
+    QUIET,
+    after_interrupt="nothing is written",
 )  # fmt: skip
-
-
 def predict(options: argparse.Namespace) -> int:
     """Predict the levels below floors, print and save them; return the exit code."""
     from thud.report.floor_files import contents, file_names, screen_text
@@ -165,22 +173,19 @@ def predict(options: argparse.Namespace) -> int:
     return finish(options, results, written, shown, comparison.notes)
 
 
-PREDICT = Command(
-    "level in the room below each floor, with its uncertainty, tables and a report",
-    (
-        *_FLOORS,
-        flag("--report", "also two pages for each floor (PDF, HTML), and what would change its "
-             "rating"),
-        option("--project", "TEXT", "project, on the first page of the report"),
-        option("--client", "TEXT", "client, on the first page of the report"),
-        *output("the results (default: outputs/prediction)"),
-        QUIET,
-    ),
-    predict,
-    "nothing is written",
+@command(
+    "listen",
+    "sound of the impacts in the rooms below, as a calibrated WAV file",
+    *_FLOORS,
+    argument("-o", "--output", metavar="FILE.wav",
+             help="the sound (default: outputs/listen/listen.wav)"),
+    argument("--position", nargs=2, type=int, metavar=("BALL", "MICROPHONE"),
+             help="numbers of positions, from 1 (default: levels nearest to the mean)"),
+    option("--pause", "S", "time between the end of a sound and the next impact (default: 1 s)",
+           type=number, default=1.0),
+    option("--seed", "N", "seed of the noise (default: 0)", type=int, default=0),
+    QUIET,
 )  # fmt: skip
-
-
 def listen_to_cases(options: argparse.Namespace) -> int:
     """Write the sounds below the floors of cases, print their levels; return the exit code."""
     from thud.export.room_sound import NOTE, listen
@@ -203,23 +208,16 @@ def listen_to_cases(options: argparse.Namespace) -> int:
     return 0
 
 
-LISTEN = Command(
-    "sound of the impacts in the rooms below, as a calibrated WAV file",
-    (
-        *_FLOORS,
-        argument("-o", "--output", metavar="FILE.wav",
-                 help="the sound (default: outputs/listen/listen.wav)"),
-        argument("--position", nargs=2, type=int, metavar=("BALL", "MICROPHONE"),
-                 help="numbers of positions, from 1 (default: levels nearest to the mean)"),
-        option("--pause", "S", "time between the end of a sound and the next impact (default: 1 s)",
-               type=number, default=1.0),
-        option("--seed", "N", "seed of the noise (default: 0)", type=int, default=0),
-        QUIET,
-    ),
-    listen_to_cases,
+@command(
+    "rate",
+    "rating of levels measured in the room below",
+    files("levels", "LEVELS.csv|LEVELS.xlsx", "frequency, levels at positions; optional: "
+          "background, reverberation_time", "recording", "table of levels"),
+    option("--volume", "M3", "volume of the room", type=number),
+    *output("the results (default: outputs/<name of the file>)"),
+    NO_FIGURES,
+    QUIET,
 )  # fmt: skip
-
-
 def rate(options: argparse.Namespace) -> int:
     """Rate measured levels, print and save the result; return the exit code."""
     from thud.floors.survey import rating_table, read_room_levels
@@ -234,20 +232,18 @@ def rate(options: argparse.Namespace) -> int:
     return finish(options, results, contents, shown, room.notes)
 
 
-RATE = Command(
-    "rating of levels measured in the room below",
-    (
-        files("levels", "LEVELS.csv|LEVELS.xlsx", "frequency, levels at positions; optional: "
-              "background, reverberation_time", "recording", "table of levels"),
-        option("--volume", "M3", "volume of the room", type=number),
-        *output("the results (default: outputs/<name of the file>)"),
-        NO_FIGURES,
-        QUIET,
-    ),
-    rate,
+@command(
+    "mobility",
+    "fit poles to a measured mobility and save it as a floor for cases",
+    files("table", "TABLE.csv|TABLE.uff", "columns frequency, real, imaginary (or magnitude, "
+          "phase), or a universal file", "recording"),
+    argument("--quantity", choices=("mobility", "accelerance", "receptance"),
+             help="quantity of the table (default: mobility)"),
+    option("--order", "N", "number of poles (default: automatic)", type=int),
+    *output("the results (default: outputs/<name of the file>)"),
+    NO_FIGURES,
+    QUIET,
 )  # fmt: skip
-
-
 def fit_mobility_table(options: argparse.Namespace) -> int:
     """Fit a measured mobility, print the errors, save the floor; return the exit code."""
     from thud.floors.mobility_fit import fit_mobility
@@ -260,19 +256,3 @@ def fit_mobility_table(options: argparse.Namespace) -> int:
     results = results_of(options, result.name, [options.table])
     shown = f"{repr(result)[1:-1]}\n{format_rows(result.rows())}"
     return finish(options, results, contents, shown, result.notes)
-
-
-MOBILITY = Command(
-    "fit poles to a measured mobility and save it as a floor for cases",
-    (
-        files("table", "TABLE.csv|TABLE.uff", "columns frequency, real, imaginary (or magnitude, "
-              "phase), or a universal file", "recording"),
-        argument("--quantity", choices=("mobility", "accelerance", "receptance"),
-                 help="quantity of the table (default: mobility)"),
-        option("--order", "N", "number of poles (default: automatic)", type=int),
-        *output("the results (default: outputs/<name of the file>)"),
-        NO_FIGURES,
-        QUIET,
-    ),
-    fit_mobility_table,
-)  # fmt: skip

@@ -11,8 +11,8 @@ from thud.base.tables import format_rows
 from thud.cli.command import (
     NO_FIGURES,
     QUIET,
-    Command,
     argument,
+    command,
     figures_of,
     file_of,
     files,
@@ -31,11 +31,52 @@ if TYPE_CHECKING:
 
     from thud.cli.command import Argument
 
-
 # Maximum number of drops that are printed.
 MAX_PRINTED = 50
 
 
+# Keys of the configuration that are options of `measure`, and the words for their values.
+OF_THE_CONFIGURATION = {
+    "source": "", "mass": "KG", "height": "M", "mass_uncertainty": "KG", "height_uncertainty": "M",
+    "channel": "NAME|NUMBER", "channels": "sum|F1+F2", "unit": "UNIT", "calibration": "N/UNIT",
+    "calibration_uncertainty": "FRACTION", "polarity": "", "sample_rate": "HZ", "drops": "NUMBERS",
+    "begin": "S", "end": "S",
+}  # fmt: skip
+FLAGS = {"begin": "--from", "end": "--to"}
+
+
+def _option(name: str) -> Argument:
+    """Return the option of a key of the configuration."""
+    entry = Config.__dataclass_fields__[name].metadata
+    # Of the check of a number or a choice.
+    limits = getattr(entry["check"], "keywords", {})
+    settings: dict[str, Any] = {"dest": name, "help": entry["meaning"]}
+    if "allowed" in limits:
+        settings["choices"] = tuple(limits["allowed"])
+    else:
+        settings["metavar"] = OF_THE_CONFIGURATION[name]
+    if "low" in limits:
+        settings["type"] = number
+    if name == "calibration":
+        settings["action"] = "append"
+    return argument(FLAGS.get(name, f"--{name.replace('_', '-')}"), **settings)
+
+
+@command(
+    "measure",
+    "levels, verdict and calibration report of recorded drops",
+    files("recordings", "FILE", "recordings of one or more drops each", "recording", nargs="+"),
+    option("--config", "LAB.toml", "file on laboratory, instruments, calibration",
+           type=file_of("TOML file")),
+    *map(_option, OF_THE_CONFIGURATION),
+    option("--leave-out", "NUMBERS", "drops to be left out", action="append"),
+    option("--because", "TEXT", "why drops are left out", action="append"),
+    *output("the results (default: outputs/<name of the first file>)"),
+    flag("--check", "exit with 3 unless the source conforms"),
+    flag("--stages", "draw the first drop after each stage of its measurement (stages.svg)"),
+    NO_FIGURES,
+    QUIET,
+)  # fmt: skip
 def measure(options: argparse.Namespace) -> int:
     """Measure recordings, print the verdict and save results; return the exit code."""
     from thud.recordings.read_recording import read_recording
@@ -84,56 +125,26 @@ def _left_out(options: argparse.Namespace) -> dict[str, str]:
     return dict(zip(numbers, reasons, strict=True))
 
 
-# Keys of the configuration that are options of `measure`, and the words for their values.
-OF_THE_CONFIGURATION = {
-    "source": "", "mass": "KG", "height": "M", "mass_uncertainty": "KG", "height_uncertainty": "M",
-    "channel": "NAME|NUMBER", "channels": "sum|F1+F2", "unit": "UNIT", "calibration": "N/UNIT",
-    "calibration_uncertainty": "FRACTION", "polarity": "", "sample_rate": "HZ", "drops": "NUMBERS",
-    "begin": "S", "end": "S",
-}  # fmt: skip
-FLAGS = {"begin": "--from", "end": "--to"}
-
-
-def _option(name: str) -> Argument:
-    """Return the option of a key of the configuration."""
-    entry = Config.__dataclass_fields__[name].metadata
-    # Of the check of a number or a choice.
-    limits = getattr(entry["check"], "keywords", {})
-    settings: dict[str, Any] = {"dest": name, "help": entry["meaning"]}
-    if "allowed" in limits:
-        settings["choices"] = tuple(limits["allowed"])
-    else:
-        settings["metavar"] = OF_THE_CONFIGURATION[name]
-    if "low" in limits:
-        settings["type"] = number
-    if name == "calibration":
-        settings["action"] = "append"
-    return argument(FLAGS.get(name, f"--{name.replace('_', '-')}"), **settings)
-
-
-MEASURE = Command(
-    "levels, verdict and calibration report of recorded drops",
-    (
-        files("recordings", "FILE", "recordings of one or more drops each", "recording", nargs="+"),
-        option("--config", "LAB.toml", "file on laboratory, instruments, calibration",
-               type=file_of("TOML file")),
-        *map(_option, OF_THE_CONFIGURATION),
-        option("--leave-out", "NUMBERS", "drops to be left out", action="append"),
-        option("--because", "TEXT", "why drops are left out", action="append"),
-        *output("the results (default: outputs/<name of the first file>)"),
-        flag("--check", "exit with 3 unless the source conforms"),
-        flag("--stages", "draw the first drop after each stage of its measurement (stages.svg)"),
-        NO_FIGURES,
-        QUIET,
-    ),
-    measure,
-)  # fmt: skip
-
-
 # Options of `calibrate` for a known force.
 OF_A_FORCE = ("mass", "force", "gravity", "uncertainty", "unit")
 
 
+@command(
+    "calibrate",
+    "calibration from a record of a known force applied to or removed from the plate, or of taps",
+    files("record", "FILE", "record of the known force or of the taps", "recording"),
+    flag("--tap", "the record holds taps with a hammer: print the resonance of the plate"),
+    option("--mass", "KG", "mass that exerts the known force", type=number),
+    option("--force", "N", "known force, if no mass is given", type=number),
+    option("--gravity", "M/S2", "local gravity for --mass, such as 9.798 (default: 9.80665, "
+           "with an uncertainty)", type=number),
+    option("--uncertainty", "FRACTION", "relative standard uncertainty of the mass or force, "
+           "such as 0.001", type=number),
+    option("--channel", "NAME|NUMBER", "channel of the force"),
+    option("--unit", "UNIT", "unit of the recorded values, if the file does not state it"),
+    QUIET,
+    after_interrupt="nothing is written",
+)  # fmt: skip
 def run_calibrate(options: argparse.Namespace) -> int:
     """Print the configuration lines of a calibration record; return the exit code."""
     from thud.recordings.calibration import calibrate
@@ -163,26 +174,14 @@ def run_calibrate(options: argparse.Namespace) -> int:
     return 0
 
 
-CALIBRATE = Command(
-    "calibration from a record of a known force applied to or removed from the plate, or of taps",
-    (
-        files("record", "FILE", "record of the known force or of the taps", "recording"),
-        flag("--tap", "the record holds taps with a hammer: print the resonance of the plate"),
-        option("--mass", "KG", "mass that exerts the known force", type=number),
-        option("--force", "N", "known force, if no mass is given", type=number),
-        option("--gravity", "M/S2", "local gravity for --mass, such as 9.798 (default: 9.80665, "
-               "with an uncertainty)", type=number),
-        option("--uncertainty", "FRACTION", "relative standard uncertainty of the mass or force, "
-               "such as 0.001", type=number),
-        option("--channel", "NAME|NUMBER", "channel of the force"),
-        option("--unit", "UNIT", "unit of the recorded values, if the file does not state it"),
-        QUIET,
-    ),
-    run_calibrate,
-    "nothing is written",
+@command(
+    "history",
+    "control chart of a ball from its calibration reports",
+    files("reports", "REPORT", "report.json files, or directories with such files",
+          "calibration report", "directory", nargs="+"),
+    *output("the chart (default: outputs/history)"),
+    QUIET,
 )  # fmt: skip
-
-
 def run_history(options: argparse.Namespace) -> int:
     """Draw the control chart of the reports of a ball; return the exit code."""
     # Matplotlib and SciPy are slow to import.
@@ -194,15 +193,3 @@ def run_history(options: argparse.Namespace) -> int:
     contents = figures_of(options, {"history": partial(draw_history, history)})
     parts = [history.title, format_rows(history.table()), *history.warnings()]
     return finish(options, results, contents, "\n".join(parts))
-
-
-HISTORY = Command(
-    "control chart of a ball from its calibration reports",
-    (
-        files("reports", "REPORT", "report.json files, or directories with such files",
-              "calibration report", "directory", nargs="+"),
-        *output("the chart (default: outputs/history)"),
-        QUIET,
-    ),
-    run_history,
-)  # fmt: skip

@@ -1,4 +1,4 @@
-"""The commands that run studies: one for each kind of study."""
+"""The commands that read study files: one for each kind of study, fits and surrogates."""
 
 from __future__ import annotations
 
@@ -9,36 +9,35 @@ from typing import TYPE_CHECKING
 from thud.base.display import warn_if_not_drawn
 from thud.base.errors import NumericalError, ThudError
 from thud.base.files import replace_file
-from thud.cli.command import NO_FIGURES, QUIET, Command, argument, file_of, output
+from thud.base.tables import format_rows
+from thud.cli.command import (
+    NO_FIGURES,
+    QUIET,
+    command,
+    figures_of,
+    files,
+    finish,
+    flag,
+    option,
+    output,
+)
 from thud.cli.screen import print_notes, print_path, print_results, print_status, shows_progress
+from thud.studies.fit import read_fit_study, run_fit
 from thud.studies.kinds import KINDS, result_type
 
 if TYPE_CHECKING:
     import argparse
 
+    from thud.studies.fitting.fit_result import Fit
     from thud.studies.run import RunOptions
+    from thud.studies.study_result import SampleResult
 
-_STUDY = argument("study", type=file_of("TOML file"), metavar="STUDY.toml", help="study file")
-_SAMPLES = (
-    argument("--yes", dest="allow_large", action="store_true", help="allow any number of samples"),
-    argument("--workers", type=int, metavar="N", help="threads (default: one per processor)"),
-    argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="address of a Dask scheduler, such as tcp://host:8786",
-    ),
-)
-
-
-def study_commands() -> dict[str, Command]:
-    """Return the command of each kind of study."""
-    results = "the results; an interrupted study resumes there (default: outputs/<study name>)"
-    arguments = (_STUDY, *output(results), *_SAMPLES, NO_FIGURES, QUIET)
-    return {name: Command(kind.help, arguments, run_study) for name, kind in KINDS.items()}
+_STUDY = files("study", "STUDY.toml", "study file", "TOML file")
+_WORKERS = option("--workers", "N", "threads (default: one per processor)", type=int)
 
 
 def run_study(options: argparse.Namespace) -> int:
-    """Run a study, print its results, save files and figures; return the exit code."""
+    """Run a study, save files and figures, print its results; return the exit code."""
     result = result_type(options.name)
     from thud.studies.run import compute, dask_executor, describe
     from thud.studies.study import read_study
@@ -61,15 +60,87 @@ def run_study(options: argparse.Namespace) -> int:
             computed = compute(result, study, folder, figures, **run_options)
     except ThudError as error:
         raise error.within(options.study) from error
-    if not options.quiet:
-        print_results(computed.table())
-    print_notes(f"{options.study}: {text}" for text in (*computed.warnings, *computed.notes))
     if computed.succeeded and not options.no_figures:
         with warn_if_not_drawn("the figure of the study"):
             from thud.plot.save_figures import figure_files
 
             for name, content in figure_files({study.name: computed.plot()}).items():
                 replace_file(folder / name, content)
+    return _print(options, computed, folder, succeeded=computed.succeeded)
+
+
+def _print(
+    options: argparse.Namespace, result: SampleResult | Fit, folder: Path, *, succeeded: bool
+) -> int:
+    """Print results, their notes and their directory; return the exit code."""
+    if not options.quiet:
+        print_results(result.table())
+    print_notes(f"{options.study}: {text}" for text in (*result.warnings, *result.notes))
     if not options.quiet:
         print_path("Results", folder)
-    return 0 if computed.succeeded else NumericalError.exit_code
+    return 0 if succeeded else NumericalError.exit_code
+
+
+for _name, _kind in KINDS.items():
+    command(
+        _name,
+        _kind.help,
+        _STUDY,
+        *output("the results; an interrupted study resumes there (default: outputs/<study name>)"),
+        flag("--yes", "allow any number of samples", dest="allow_large"),
+        _WORKERS,
+        option("--scheduler", "ADDRESS", "address of a Dask scheduler, such as tcp://host:8786"),
+        NO_FIGURES,
+        QUIET,
+    )(run_study)
+
+
+@command(
+    "surrogate",
+    "train a fast approximation of a slow model for other studies",
+    _STUDY,
+    *output("the surrogate; a training goes on there (default: outputs/<study name>)"),
+    _WORKERS,
+    NO_FIGURES,
+    QUIET,
+)
+def train(options: argparse.Namespace) -> int:
+    """Train a surrogate, print its errors and save them as a figure; return the exit code."""
+    from thud.studies.surrogate import read_training, surrogate
+
+    training = read_training(options.study)
+    folder = Path(options.output or Path("outputs", training.name))
+    trained = surrogate(
+        training, folder, workers=options.workers, replace=options.replace,
+        progress=shows_progress(quiet=options.quiet),
+    )  # fmt: skip
+    contents = {training.file: trained.to_bytes()}
+    contents |= figures_of(options, {training.name: trained.plot})
+    results = training.results(folder, replace=options.replace)
+    return finish(options, results, contents, format_rows(trained.rows()), trained.notes)
+
+
+@command(
+    "fit",
+    "parameters of a model from a force or from levels",
+    _STUDY,
+    *output("the results (default: outputs/<study name>)"),
+    NO_FIGURES,
+    QUIET,
+    after_interrupt="nothing is written",
+)
+def fit(options: argparse.Namespace) -> int:
+    """Run a fit, save files and figures, print its results; return the exit code."""
+    study = read_fit_study(options.study)
+    if not options.quiet:
+        names = ", ".join(parameter.name for parameter in study.parameters)
+        print_status(f"{study.name}: {names} of {study.case.model.name}")  # type: ignore[union-attr]
+    folder = Path(options.output or Path("outputs", study.name))
+    try:
+        result = run_fit(
+            study, folder, figures=not options.no_figures,
+            progress=shows_progress(quiet=options.quiet), replace=options.replace,
+        )  # fmt: skip
+    except ThudError as error:
+        raise error.within(options.study) from error
+    return _print(options, result, folder, succeeded=result.converged)
