@@ -7,10 +7,12 @@ import warnings
 from abc import ABC, abstractmethod
 from contextlib import contextmanager
 from html import escape
+from itertools import chain, repeat
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from thud.base.checks import shown_text
 from thud.base.errors import ReportWarning
 from thud.base.extras import data_frame, require_extra
 from thud.base.files import replace_file
@@ -32,8 +34,6 @@ if TYPE_CHECKING:
     Columns = Mapping[str, tuple[Iterable[Any], str]]
 
 _SYMBOL = re.compile(r"\b([CL])_(FE|I|iA,Fmax|n,w)\b")
-# Maximum length of a cause in a warning.
-_MAX_CAUSE = 100
 
 
 class Displayed(Immutable, ABC):
@@ -44,7 +44,10 @@ class Displayed(Immutable, ABC):
         """Return header and rows of the table."""
 
     def _repr_html_(self) -> str:
-        return f"<p>{html_text(repr(self)[1:-1])}</p>\n{html_table(self.rows())}"
+        rows = zip(chain(["th"], repeat("td")), self.rows(), strict=False)
+        cells = ("".join(f"<{tag}>{html_text(cell)}</{tag}>" for cell in row) for tag, row in rows)
+        table = "".join(f"<tr>{cell}</tr>\n" for cell in cells)
+        return f"<p>{html_text(repr(self)[1:-1])}</p>\n<table>\n{table}</table>"
 
 
 class Tabulated(Displayed):
@@ -117,7 +120,7 @@ def warn_if_not_drawn(figure: str) -> Iterator[None]:
         # Compiled modules turn an interrupt into another error.
         if isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
             raise
-        cause = (str(error) or type(error).__name__).partition("\n")[0][:_MAX_CAUSE]
+        cause = shown_text(error, 100) or type(error).__name__
         message = f"{figure} is not drawn ({cause}); the results are complete without it"
         warnings.warn(message, ReportWarning, stacklevel=4)
 
@@ -127,18 +130,9 @@ def draw_all(draws: Mapping[str, Callable[[], Figure | None]]) -> dict[str, Figu
     drawn = {}
     for name, draw in draws.items():
         with warn_if_not_drawn(name):
-            figure = draw()
-            if figure is not None:
+            if (figure := draw()) is not None:
                 drawn[name] = figure
     return drawn
-
-
-def html_table(rows: Iterable[Sequence[str]]) -> str:
-    """Return rows of text, the header first, as HTML."""
-    header, *body = (tuple(map(html_text, row)) for row in rows)
-    lines = [("th", header), *(("td", row) for row in body)]
-    cells = ["".join(f"<{tag}>{cell}</{tag}>" for cell in row) for tag, row in lines]
-    return "<table>\n" + "".join(f"<tr>{line}</tr>\n" for line in cells) + "</table>"
 
 
 def html_text(text: str) -> str:

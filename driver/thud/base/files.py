@@ -7,11 +7,10 @@ import os
 import secrets
 import shutil
 import stat
-from abc import ABC, abstractmethod
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, NoReturn
+from typing import TYPE_CHECKING, Any
 
 from thud.base.bridge import ask
 from thud.base.checks import refuse, require_kind, shown_text
@@ -46,47 +45,16 @@ def replace_file(path: str | os.PathLike[str], content: bytes) -> None:
         refuse(f"{path!r} is not allowed", "the path of a file", error)
 
 
-class Page(ABC):
-    """Base of comparisons that are saved as a figure and an HTML page."""
-
-    # The subcommand of `thud-driver` that saves the files.
-    _command: ClassVar[str]
-
-    @abstractmethod
-    def files(self) -> dict[str, bytes]:
-        """Return the contents of the files by name."""
-
-    def save(self, directory: str | os.PathLike[str], *, replace: bool = False) -> list[Path]:
-        """Write the contents of `files` into a directory of their own; return the paths.
-
-        A directory is replaced as a whole: one that holds results of something else only if
-        `replace` is true. Raise InputError if it holds any other file, and OSError if a file cannot
-        be written.
-        """
-        return Results(Path(directory), self._command, replace=replace).write(self.files())
-
-
 @dataclass(frozen=True)
 class Results:
-    """A directory of results, replaced as a whole; see `thud_result_directory` of the library.
+    """A directory of results, replaced as a whole; see `thud_result_directory` of the library."""
 
-    Attributes
-    ----------
-    folder : Path
-        The directory; it may be missing.
-    command : str
-        The subcommand that writes the results.
-    subject : str
-        What they are results of, such as the name of a case; others are replaced on demand only.
-    inputs : tuple of path-like
-        Files that the results depend on, never replaced.
-    replace : bool
-        Also replace results of another subject.
-    """
-
+    # The directory, which may be missing, and the subcommand that writes the results.
     folder: Path
     command: str
+    # What they are results of, such as the name of a case; others are replaced with `replace` only.
     subject: str = ""
+    # Files that the results depend on, never replaced.
     inputs: tuple[str | os.PathLike[str], ...] = ()
     replace: bool = False
 
@@ -147,14 +115,6 @@ def _encoded(path: str | os.PathLike[str]) -> bytes:
     if {"\n", "\0"} & {*os.fsdecode(path)}:
         refuse(f"{os.fsdecode(path)!r} is not allowed", "a path in one line without zero bytes")
     return os.fsencode(path)
-
-
-def refuse_foreign(path: Path) -> NoReturn:
-    """Raise InputError for a file or directory that thud has not written."""
-    refuse(
-        f"{path} is in the way: thud has not written it",
-        "another directory, or --replace (replace=True) to replace it",
-    )
 
 
 def is_one_of(path: Path, others: Iterable[str | os.PathLike[str]]) -> bool:

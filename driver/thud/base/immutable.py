@@ -29,15 +29,6 @@ class Immutable:
         Immutable.__post_init__(self)
 
 
-class Plain:
-    """Base of inputs: lists and arrays become tuples, and NumPy's scalars Python's, as in files."""
-
-    def __post_init__(self) -> None:
-        """Store plain values."""
-        for name, value in vars(self).items():
-            object.__setattr__(self, name, plain(value))
-
-
 def freeze(array: Array) -> Array:
     """Make an array read-only, and return it."""
     array.setflags(write=False)

@@ -21,47 +21,30 @@ _TYPES: dict[Kind, set[type]] = {
 
 @dataclass(frozen=True)
 class Key:
-    """Input key, declared by the library.
+    """Input key, declared by the library."""
 
-    Attributes
-    ----------
-    owner : str
-        What uses the key: a source model, a floor, ``"modes"``, ``"compression"``, ``"unknowns"``,
-        ``"floor"`` or ``"room"``; empty if every impact uses it.
-    group, name : str
-        Namelist group and name.
-    kind : str
-        ``"real"``, ``"whole"``, ``"choice"``, ``"flag"``, ``"list"`` (of numbers), ``"text"`` or
-        ``"texts"`` (a list).
-    unit : str
-        SI unit; empty for pure numbers.
-    meaning : str
-        Description.
-    choices : tuple of str
-        Allowed values of a choice.
-    lower, upper : float or str
-        Limits of the allowed range; a text is the key of the group whose value is the limit.
-    whole : bool
-        Whether only whole numbers are allowed.
-    lower_open, upper_open : bool
-        Whether the range excludes its lower and its upper limit.
-    needs : tuple of str
-        Name of a choice and its values with which the key has an effect, that of the standard ball
-        first; empty: with all.
-    """
-
+    # What uses the key: a source model, a floor, "modes", "compression", "unknowns", "floor" or
+    # "room"; empty if every impact uses it.
     owner: str
+    # Namelist group, and name in it.
     group: str
     name: str
+    # A "list" has numbers, "texts" are a list of them.
     kind: Kind = "real"
+    # SI unit; empty for pure numbers.
     unit: str = ""
     meaning: str = ""
+    # Allowed values of a choice.
     choices: tuple[str, ...] = ()
+    # Limits of the allowed range; a text is the key of the group whose value is the limit.
     lower: float | str = -math.inf
     upper: float | str = math.inf
+    # Whether only whole numbers are allowed, and whether the range excludes its limits.
     whole: bool = False
     lower_open: bool = False
     upper_open: bool = False
+    # Name of a choice and its values with which the key has an effect, that of the standard ball
+    # first; empty: with all.
     needs: tuple[str, ...] = ()
 
     @property
@@ -108,30 +91,16 @@ class Key:
 
 @dataclass(frozen=True)
 class Quantity:
-    """Number that describes an impact.
+    """Number that describes an impact."""
 
-    Attributes
-    ----------
-    name, title : str
-        Name in files and programs, and in tables for readers.
-    symbol : str
-        Symbol in the mathematical notation of matplotlib; empty if there is none.
-    unit : str
-        SI unit, or dB; empty for pure numbers.
-    display_unit : str
-        Unit in tables for readers.
-    display_scale : float
-        Number of display units in one `unit`.
-    decimals : int
-        Decimals in tables for readers.
-    meaning : str
-        Description.
-    """
-
+    # Name in files and programs, and in tables for readers.
     name: str
     title: str
+    # Symbol in the mathematical notation of matplotlib; empty if there is none.
     symbol: str
+    # SI unit, or dB; empty for pure numbers.
     unit: str
+    # In tables for readers: unit, number of these units in one `unit`, and decimals.
     display_unit: str
     display_scale: float
     decimals: int
@@ -151,9 +120,9 @@ class Quantity:
 
 
 class Group:
-    """Base of the dataclasses whose fields are keys; lists and arrays become tuples."""
+    """Base of inputs: lists and arrays become tuples, NumPy's scalars Python's, as in files."""
 
-    # Keys by the names of the fields.
+    # Keys by the names of the fields, if these are keys.
     keys: ClassVar[Mapping[str, Key]] = {}
 
     def __post_init__(self) -> None:

@@ -70,13 +70,9 @@ _PLAIN = str.maketrans("\u00b5\u03bc\u00b2\u00b3", "uu23", " *\u00b7\u22c5^\u00a
 NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
 # Units of tables and figures, ascending.
 DISPLAY_UNITS = {
-    "Pa": ("Pa", "kPa", "MPa", "GPa"),
-    "m": ("mm", "m"),
-    "s": ("ms", "s"),
-    "Hz": ("Hz", "kHz"),
-    "N/m": ("N/m", "kN/m"),
-    "N/m3": ("N/m3", "kN/m3", "MN/m3"),
-}
+    "Pa": ("Pa", "kPa", "MPa", "GPa"), "m": ("mm", "m"), "s": ("ms", "s"), "Hz": ("Hz", "kHz"),
+    "N/m": ("N/m", "kN/m"), "N/m3": ("N/m3", "kN/m3", "MN/m3"),
+}  # fmt: skip
 
 
 def find_unit(text: str) -> str:

@@ -19,7 +19,7 @@ from thud.base._schema import LIMITS, QUANTITIES, SAMPLE_QUANTITIES, VERDICTS
 from thud.base.checks import refuse, refuse_value, require_choice, require_kind
 from thud.base.display import Displayed
 from thud.base.errors import PlausibilityWarning, ThudError
-from thud.base.files import Page
+from thud.base.files import Results
 from thud.base.tables import Result
 from thud.case.case import Case, read_case
 from thud.impact.compute import compute
@@ -50,7 +50,7 @@ _OTHERS = [
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison(Displayed, Page):
+class Comparison(Displayed):
     """Impacts of the same drop, side by side.
 
     Attributes
@@ -69,7 +69,6 @@ class Comparison(Displayed, Page):
     run_times: dict[str, float]
     force: LevelsForce | None = None
     source: LimitsSource = "rubber_ball"
-    _command = "compare"
 
     @property
     def warnings(self) -> list[str]:
@@ -127,6 +126,15 @@ class Comparison(Displayed, Page):
     def files(self) -> dict[str, bytes]:
         """Return ``comparison.svg`` and ``comparison.html`` by name."""
         return page_files("comparison", self.plot, self.html())
+
+    def save(self, directory: str | os.PathLike[str], *, replace: bool = False) -> list[Path]:
+        """Write the contents of `files` into a directory of their own; return the paths.
+
+        A directory is replaced as a whole: one that holds results of something else only if
+        `replace` is true. Raise InputError if it holds any other file, and OSError if a file cannot
+        be written.
+        """
+        return Results(Path(directory), "compare", replace=replace).write(self.files())
 
 
 def _cell(criterion: Criterion) -> str:

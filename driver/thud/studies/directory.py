@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 from thud.base.checks import refuse, shown_text
-from thud.base.files import is_failure, is_one_of, refuse_foreign
+from thud.base.files import is_failure, is_one_of
 from thud.studies.dataset import read_identity
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def open_directory(
         if is_one_of(path, study.inputs):
             refuse(f"{path} is an input, which is never replaced", "another directory")
         if path in beside and (_is_directory(path) or not (begun or replace)):
-            refuse_foreign(path)
+            _refuse_foreign(path)
     old = [path for path in begun if _is_outdated(path, study, replace=replace)]
     for path in (*old, *beside, folder / f"{study.name}.svg") if old else ():
         remove(path)
@@ -53,7 +53,7 @@ def _is_outdated(path: Path, study: Study, *, replace: bool) -> bool:
     if before is None or before == study.identity:
         return False
     if not before and (not replace or _is_directory(path)):
-        refuse_foreign(path)
+        _refuse_foreign(path)
     if not replace:
         now = study.identity
         key = next(key for key in {**before, **now} if before.get(key) != now.get(key))
@@ -63,6 +63,12 @@ def _is_outdated(path: Path, study: Study, *, replace: bool) -> bool:
             "another directory, or --replace (replace=True) to compute the study again",
         )
     return True
+
+
+def _refuse_foreign(path: Path) -> NoReturn:
+    """Raise InputError for a file or directory that thud has not written."""
+    problem = f"{path} is in the way: thud has not written it"
+    refuse(problem, "another directory, or --replace (replace=True) to replace it")
 
 
 def remove(path: Path) -> None:
