@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from matplotlib.figure import Figure
 
+    from thud.base.note import Note
     from thud.level.assessment import Verdict
 
     Function = Callable[[argparse.Namespace], int]
@@ -183,7 +184,7 @@ def finish(  # noqa: PLR0913, PLR0917 - all that a command shows
     results: Results,
     contents: Mapping[str, bytes],
     shown: str,
-    notes: Iterable[object] = (),
+    notes: Iterable[Note | str] = (),
     verdict: Verdict | None = None,
 ) -> int:
     """Write files, print text, notes and the path of the results; return the exit code.
@@ -207,7 +208,7 @@ def print_immediately() -> Iterator[None]:
 
     def show(warning: Any, kind: type[Warning], *origin: Any) -> None:  # noqa: ANN401 - of any warning
         if issubclass(kind, ReportWarning):
-            print_notes([warning])
+            print_notes([str(warning)])
         else:
             usual(warning, kind, *origin)
 

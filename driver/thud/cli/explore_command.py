@@ -8,7 +8,6 @@ import socket
 import sys
 import tempfile
 import webbrowser
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -19,7 +18,6 @@ from thud.cli.screen import print_notes, print_path, print_results
 
 if TYPE_CHECKING:
     import argparse
-    from collections.abc import Iterator
 
 # Host names that are reachable from this machine only.
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
@@ -68,12 +66,15 @@ def explore(options: argparse.Namespace) -> int:
         )
         print_notes([warning])
     application = new_application(start, token=token, hosts=hosts)
-    with listener, tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        with _temporary_files_in(folder):
+    before = tempfile.tempdir
+    with listener, tempfile.TemporaryDirectory() as folder:
+        tempfile.tempdir = folder
+        try:
             if not options.no_browser:
-                webbrowser.open(_redirect(folder, address))
+                webbrowser.open(_redirect(Path(folder), address))
             run_server(application, listener)
+        finally:
+            tempfile.tempdir = before
     return 0
 
 
@@ -85,16 +86,6 @@ def _reachable_name(host: str) -> str:
     """
     is_wsl = "microsoft" in platform.release().lower()
     return "localhost" if is_wsl and host in LOOPBACK else ALL_ADDRESSES.get(host, host)
-
-
-@contextmanager
-def _temporary_files_in(folder: Path) -> Iterator[None]:
-    before = tempfile.tempdir
-    tempfile.tempdir = str(folder)
-    try:
-        yield
-    finally:
-        tempfile.tempdir = before
 
 
 def _redirect(folder: Path, address: str) -> str:

@@ -155,22 +155,19 @@ def run_calibrate(options: argparse.Namespace) -> int:
             if getattr(options, name) is not None:
                 refuse(f"calibrate: --{name.replace('_', '-')} with --tap", "a known force or taps")
         plate = calibrate_tap(options.record, channel=options.channel)
-        print(plate.lines())
-        if not options.quiet:
-            print_results(f"# {plate}")
-        print_notes(plate.notes)
-        return 0
-    chosen = {name: getattr(options, name) for name in (*OF_A_FORCE, "channel")}
-    chosen["uncertainty"] = options.uncertainty or 0.0
-    result = calibrate(options.record, **chosen)
-    print(f'calibration = "{result.chain}"')
-    print(f"calibration_uncertainty = {result.uncertainty:.2g}")
+        lines, origin, notes = plate.lines(), str(plate), plate.notes
+    else:
+        chosen = {name: getattr(options, name) for name in (*OF_A_FORCE, "channel")}
+        chosen["uncertainty"] = options.uncertainty or 0.0
+        result = calibrate(options.record, **chosen)
+        uncertainty = f"calibration_uncertainty = {result.uncertainty:.2g}"
+        lines = f'calibration = "{result.chain}"\n{uncertainty}'
+        origin, notes = result.origin, result.notes
+    print(lines)
     if not options.quiet:
-        print_results(f"# {result.origin}")
-        for note in result.notes:
-            if not note.is_warning:
-                print_results(f"# {note}")
-    print_notes([note for note in result.notes if note.is_warning])
+        for text in (origin, *(note for note in notes if not note.is_warning)):
+            print_results(f"# {text}")
+    print_notes([note for note in notes if note.is_warning])
     return 0
 
 

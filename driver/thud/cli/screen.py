@@ -13,6 +13,8 @@ from thud.base.tables import END_MARK, MARKS, WIDTH, unmarked, wrap
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
+    from thud.base.note import Note
+
 RED, GREEN, YELLOW = 31, 32, 33
 # Colors of verdicts by their marks.
 _COLORS = dict(zip(MARKS.values(), (GREEN, RED, YELLOW), strict=True))
@@ -34,10 +36,10 @@ def print_path(title: str, path: object) -> None:
     tqdm.write(line if len(line) <= WIDTH else f"{title}:\n{path}", file=sys.stdout)
 
 
-def print_notes(notes: Iterable[object]) -> None:
+def print_notes(notes: Iterable[Note | str]) -> None:
     """Print notes, with their subjects, or texts above any progress bar."""
     for note in notes:
-        _print_message(str(getattr(note, "message", note)), YELLOW)
+        _print_message(note if isinstance(note, str) else note.message, YELLOW)
 
 
 def print_error(message: str) -> None:

@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     import argparse
 
     from thud.studies.fitting.fit_result import Fit
-    from thud.studies.run import RunOptions
     from thud.studies.study_result import SampleResult
 
 _STUDY = files("study", "STUDY.toml", "study file", "TOML file")
@@ -47,17 +46,14 @@ def run_study(options: argparse.Namespace) -> int:
         print_status(describe(study))
     folder = Path(options.output or Path("outputs", study.name))
     figures = () if options.no_figures else (f"{study.name}.svg",)
-    run_options: RunOptions = {
-        "workers": options.workers,
-        "allow_large": options.allow_large,
-        "progress": shows_progress(quiet=options.quiet),
-        "replace": options.replace,
-    }
     scheduler = options.scheduler
     try:
         with dask_executor(scheduler) if scheduler else nullcontext() as executor:
-            run_options["executor"] = executor
-            computed = compute(result, study, folder, figures, **run_options)
+            computed = compute(
+                result, study, folder, figures, executor=executor, workers=options.workers,
+                allow_large=options.allow_large, replace=options.replace,
+                progress=shows_progress(quiet=options.quiet),
+            )  # fmt: skip
     except ThudError as error:
         raise error.within(options.study) from error
     if computed.succeeded and not options.no_figures:
