@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 import re
 import textwrap
 from itertools import zip_longest
@@ -75,22 +74,15 @@ def format_rows(rows: Iterable[Sequence[str]]) -> str:
         min(max(len(word.rstrip()) for cell in column for word in _WORD.findall(cell)), _MAX_WORD)
         for column in columns
     ]
-    natural = [max(map(len, column)) for column in columns]
-
-    def split(limit: float) -> list[list[int]]:
-        tables = [[0]]
-        for i in range(1, len(columns)):
-            longer = [*tables[-1], i]
-            is_wide = _total([natural[k] for k in longer]) > limit
-            is_wide |= _total([minima[k] for k in longer]) > WIDTH
-            if is_wide and len(tables[-1]) > 1:
-                tables.append([0])
-            tables[-1].append(i)
-        return tables
-
-    # As few tables as fit, of similar widths: the levels of all bands stand in one.
-    fewest = len(split(math.inf))
-    tables = next(parts for w in range(_total(natural) + 1) if len(parts := split(w)) == fewest)
+    # As few tables as fit, with as many columns each or less in the first: the levels of all bands
+    # stand in one.
+    others = max(1, len(columns) - 1)
+    for count in range(1, others + 1):
+        size = -(-others // count)
+        ends = range(len(columns), min(1, len(columns) - 1), -size)
+        tables = [[0, *range(max(1, end - size), end)] for end in reversed(ends)]
+        if all(_total([minima[i] for i in table]) <= WIDTH for table in tables):
+            break
     return "\n\n".join(
         _format_table([columns[i] for i in table], [minima[i] for i in table]) for table in tables
     )

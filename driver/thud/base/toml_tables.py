@@ -106,13 +106,12 @@ class TomlTable:
     @property
     def stated(self) -> list[str]:
         """Names of the keys whose values are not the defaults."""
-        values = [(entry, getattr(self, entry.name)) for entry in fields(self)]
         return [
             entry.name
-            for entry, value in values
+            for entry in fields(self)
+            if (value := getattr(self, entry.name)) is not None and value is not entry.default
             # The default of keys without another one is an empty table.
-            if value is not None and value is not entry.default
-            if entry.default is not MISSING or not (isinstance(value, dict) and not value)
+            if entry.default is not MISSING or value != {}
         ]
 
     def require(self, *names: str) -> None:
