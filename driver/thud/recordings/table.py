@@ -8,16 +8,18 @@ from __future__ import annotations
 import codecs
 import itertools
 import re
+import zipfile
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
+from xml.etree.ElementTree import ParseError
 
 import numpy as np
 
 from thud.base.checks import refuse, shown_text
 from thud.base.errors import InputError
+from thud.base.extras import require_extra
 from thud.base.files import regular_file, require_small
 from thud.base.units import factor_to, size_of
-from thud.base.workbooks import read_workbook
 from thud.recordings.header import Layout, read_header
 from thud.recordings.words import (
     COMMENT,
@@ -42,6 +44,8 @@ if TYPE_CHECKING:
 # Maximum length of a line, and number of lines in a header.
 MAX_LINE = 2**16
 MAX_HEADER = 1000
+# Maximum number of rows that are read of a sheet.
+MAX_ROWS = 10_000
 # Number of lines per conversion.
 BLOCK = 2**14
 # By decimal mark: characters that np.loadtxt cannot read, so that lines are read one by one.
@@ -140,7 +144,7 @@ def read_table(path: str | os.PathLike[str], allowed: str = ALLOWED) -> Table:
     try:
         lines: Callable[[], Iterable[str]]
         if is_workbook := file.suffix.lower() == ".xlsx":
-            sheet, rows = read_workbook(file, allowed)
+            sheet, rows = _read_workbook(file, allowed)
             name, lines = f"{name}, sheet {sheet!r}", lambda: rows
         else:
             require_small(file, "text")
@@ -330,3 +334,31 @@ def _read_row(line: int, cells: list[str], layout: Layout, decimal: str, shown: 
             text = f"column {i + 1} has a number, {shown_text(cells[i])}, but none in line "
             layout.refuse(line, text + str(layout.first), "columns of numbers or of words")
     return row
+
+
+def _read_workbook(path: Path, allowed: str) -> tuple[str, list[str]]:
+    """Return the name of the first sheet that has numbers, and its rows, cells separated by tabs.
+
+    Cells of formulas have the value that the spreadsheet program has saved.
+    """
+    with require_extra("workbooks"):
+        import openpyxl
+    try:
+        book = openpyxl.load_workbook(path, read_only=True, data_only=True)
+        sheets = {
+            sheet.title: list(sheet.iter_rows(max_row=MAX_ROWS + 1, values_only=True))
+            for sheet in book.worksheets
+        }
+        book.close()
+    except (OSError, KeyError, ValueError, TypeError, zipfile.BadZipFile, ParseError) as error:
+        refuse(f"{path}: cannot be read ({error})", allowed, error)
+    for name, rows in sheets.items():
+        if any(isinstance(cell, int | float) for row in rows for cell in row):
+            if len(rows) > MAX_ROWS:
+                refuse(f"{path}: sheet {name!r} has more than {MAX_ROWS} rows", "a table as text")
+            return name, ["\t".join(map(_cell_text, row)) for row in rows]
+    return refuse(f"{path}: cannot be read (no numbers)", allowed)
+
+
+def _cell_text(cell: object) -> str:
+    return "" if cell is None else " ".join(str(cell).replace('"', "'").split())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from functools import partial
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
@@ -10,18 +11,19 @@ from thud.base._schema import RATED_BANDS
 from thud.base.bridge import version
 from thud.base.display import draw_all
 from thud.base.tables import csv_text, marked
-from thud.base.workbooks import workbook
 from thud.floors.description import CAVEAT, verdict_text
 from thud.floors.prediction import source_note
 from thud.report.predicted_floor import tables
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
     from pathlib import Path
 
     from thud.report.predicted_floor import PredictedFloor
 
 WORKBOOK = "predictions.xlsx"
+# Maximum width of its columns, characters.
+_MAX_WIDTH = 60
 # Tables that are files too, not only sheets of the workbook; the last is part of the report.
 _TABLES = ("bands", "octaves", "ratings", "contributions", "paths", "modes", "changes")
 
@@ -62,7 +64,7 @@ def contents(floors: Sequence[PredictedFloor], folder: Path, *, report: bool) ->
     rows = tables(floors, changes=report)
     result = {f"{name}.csv": _csv(table) for name, table in rows.items() if name in _TABLES}
     if find_spec("openpyxl"):
-        result[WORKBOOK] = workbook(rows)
+        result[WORKBOOK] = _workbook(rows)
     if report:
         for floor in floors:
             result |= page_contents(floor, folder)
@@ -93,3 +95,28 @@ def page_contents(floor: PredictedFloor, folder: Path) -> dict[str, bytes]:
 def _csv(rows: Iterable[Iterable[object]]) -> bytes:
     comment = f"# thud {version()}; levels in the room in dB re 20 uPa\n"
     return (comment + csv_text(rows)).encode()
+
+
+def _workbook(sheets: Mapping[str, Iterable[Sequence[str | float]]]) -> bytes:
+    """Return a workbook of tables by the names of their sheets, each with a header row."""
+    import openpyxl
+
+    book = openpyxl.Workbook()
+    book.remove(book.active)
+    for name, rows in sheets.items():
+        sheet = book.create_sheet(name)
+        for row in rows:
+            sheet.append(list(row))
+            for cell in sheet[sheet.max_row]:
+                # A text that begins with an equals sign is no formula.
+                if isinstance(cell.value, str):
+                    cell.data_type = "s"
+        sheet.freeze_panes = "B2"
+        for column in sheet.columns:
+            values = (cell.value for cell in column)
+            shown = (f"{v:.9g}" if isinstance(v, float) else str(v) for v in values)
+            width = min(max(map(len, shown)) + 2, _MAX_WIDTH)
+            sheet.column_dimensions[column[0].column_letter].width = width
+    content = io.BytesIO()
+    book.save(content)
+    return content.getvalue()
