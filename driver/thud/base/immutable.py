@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-Array = TypeVar("Array", bound="NDArray[Any]")
 
 
 class Immutable:
@@ -29,7 +27,16 @@ class Immutable:
         Immutable.__post_init__(self)
 
 
-def freeze(array: Array) -> Array:
+class Plain:
+    """Base of inputs: lists and arrays become tuples, and NumPy's scalars Python's, as in files."""
+
+    def __post_init__(self) -> None:
+        """Store plain values."""
+        for name, value in vars(self).items():
+            object.__setattr__(self, name, plain(value))
+
+
+def freeze(array: NDArray[Any]) -> NDArray[Any]:
     """Make an array read-only, and return it."""
     array.setflags(write=False)
     return array

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from thud.base.checks import refuse_value, shown
 from thud.base.immutable import plain
@@ -12,8 +12,8 @@ from thud.base.immutable import plain
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-Kind = Literal["real", "whole", "choice", "flag", "list", "text", "texts"]
-_TYPES: dict[Kind, set[type]] = {
+# Types of values by kinds of keys.
+_TYPES: dict[str, set[type]] = {
     "real": {int, float}, "whole": {int}, "flag": {bool}, "list": {int, float}, "choice": {str},
     "text": {str}, "texts": {str},
 }  # fmt: skip
@@ -29,8 +29,8 @@ class Key:
     # Namelist group, and name in it.
     group: str
     name: str
-    # A "list" has numbers, "texts" are a list of them.
-    kind: Kind = "real"
+    # An entry of `_TYPES`; a "list" has numbers, "texts" are a list of them.
+    kind: str = "real"
     # SI unit; empty for pure numbers.
     unit: str = ""
     meaning: str = ""
@@ -120,9 +120,9 @@ class Quantity:
 
 
 class Group:
-    """Base of inputs: lists and arrays become tuples, NumPy's scalars Python's, as in files."""
+    """Base of the dataclasses whose fields are keys; lists and arrays become tuples."""
 
-    # Keys by the names of the fields, if these are keys.
+    # Keys by the names of the fields.
     keys: ClassVar[Mapping[str, Key]] = {}
 
     def __post_init__(self) -> None:

@@ -14,9 +14,8 @@ from thud.base.checks import (
     refuse_value,
     require_choice,
     require_number,
-    shown_text,
 )
-from thud.base.files import read_input
+from thud.base.files import regular_file
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -32,12 +31,9 @@ def read_toml(path: Path) -> tuple[dict[str, Any], str]:
     Raise InputError with the path if the file cannot be read or is not TOML.
     """
     try:
-        text = read_input(path).decode("utf-8-sig")
+        text = regular_file(path).read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
         refuse(f"{path}: byte {error.start + 1} is not UTF-8", "TOML, which is UTF-8", error)
-    except (OSError, ValueError) as error:  # a zero byte
-        reason = getattr(error, "strerror", "no path")
-        refuse(f"{shown_text(path)}: {reason}", "a file that exists and can be read", error)
     try:
         return tomllib.loads(text), text
     except (ValueError, RecursionError) as error:  # no TOML, or thousands of digits or brackets
@@ -111,7 +107,7 @@ class TomlTable:
             for entry in fields(self)
             if (value := getattr(self, entry.name)) is not None and value is not entry.default
             # The default of keys without another one is an empty table.
-            if entry.default is not MISSING or value != {}
+            if entry.default is not MISSING or not (isinstance(value, dict) and not value)
         ]
 
     def require(self, *names: str) -> None:

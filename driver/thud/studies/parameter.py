@@ -20,7 +20,8 @@ from thud.base.checks import (
     require_whole,
     shown,
 )
-from thud.base.key import Group, Key
+from thud.base.immutable import Plain
+from thud.base.key import Key
 from thud.base.units import power_of, scaled
 from thud.case.keys import Value, find_key
 from thud.impact.datasets import coordinate_name
@@ -48,7 +49,7 @@ _SCALES = ("linear", "log")
 
 
 @dataclass(frozen=True, eq=False)
-class Parameter(Group):
+class Parameter(Plain):
     """A parameter of a study, as stated by its table in ``[parameters]``.
 
     Attributes

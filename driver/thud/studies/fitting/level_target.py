@@ -10,7 +10,7 @@ import numpy as np
 
 from thud.base._schema import SAMPLE_QUANTITIES
 from thud.base.checks import refuse, refuse_unknown, require_choice, shown
-from thud.base.key import Group
+from thud.base.immutable import Plain
 from thud.level.levels import BANDWIDTHS, FORCES, get_bands
 from thud.studies.fitting.comparison import STEP, Comparison, numbers, require_positive
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class LevelTarget(Group):
+class LevelTarget(Plain):
     """Levels to be fitted, and other quantities of the impact.
 
     Attributes
