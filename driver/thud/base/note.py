@@ -18,29 +18,19 @@ _SENTENCES = PROCESSING | WARNINGS
 
 @dataclass(frozen=True, eq=True)
 class Note:
-    """A fact: a possible fault, an assumption, or a step of processing.
+    """A fact: a possible fault, an assumption, or a step of processing."""
 
-    Attributes
-    ----------
-    code : str
-        Its entry in `thud.base.sentences`, from which `sentence` makes words.
-    subject : str
-        What it is about: a key as ``"group.key"``, a file, a drop, a band or a criterion.
-    value, low, high : float
-        Value, and the range that it should have; NaN if there is none.
-    unit : str
-        Unit of these numbers.
-    others : mapping
-        Further values of the sentence, by name. A ``"part"`` is the part of the subject,
-        such as a load cell, that it is about.
-    """
-
+    # Its entry in `thud.base.sentences`, from which `sentence` makes words.
     code: str
+    # What it is about: a key as "group.key", a file, a drop, a band or a criterion.
     subject: str = ""
+    # Value, the range that it should have, NaN if there is none, and the unit of these numbers.
     value: float = math.nan
     low: float = math.nan
     high: float = math.nan
     unit: str = ""
+    # Further values of the sentence, by name. A "part" is the part of the subject, such as a load
+    # cell, that it is about.
     others: Mapping[str, float | str] = field(default_factory=dict, hash=False)
 
     @property

@@ -31,13 +31,7 @@ _NO_MARKS = {ord(mark): None for mark in (*MARKS.values(), END_MARK)}
 
 
 class Result(str):
-    """Cell of a table that tells a verdict in words of its own.
-
-    Attributes
-    ----------
-    verdict : str
-        The verdict, an entry of `thud.base._schema.VERDICTS`.
-    """
+    """Cell of a table that tells a verdict, an entry of `VERDICTS`, in words of its own."""
 
     __slots__ = ("verdict",)
     verdict: str
