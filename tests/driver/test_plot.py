@@ -151,7 +151,6 @@ def test_mode_shapes_are_named() -> None:
         f"{f:.1f} Hz, n = {n}" for f, n in zip(modes.frequency, modes.harmonic, strict=True)
     ]
     assert figure.get_figwidth() == pytest.approx(WIDTH)
-    assert thud.plot.mode_shapes(modes, columns=6).get_figwidth() == pytest.approx(2 * WIDTH)
 
 
 def test_loss_factors_follow_their_laws() -> None:
@@ -174,15 +173,6 @@ def test_figures_without_snapshots_are_refused(tmp_path: Path) -> None:
         thud.plot.motion(thud.solve())
     with pytest.raises(thud.InputError, match=naming("ball.mp4", "gif")):
         thud.plot.animate(thud.solve(), tmp_path / "ball.mp4")
-
-
-@pytest.mark.parametrize(("count", "allowed"), [(0, False), (1, True), (30, True), (31, False)])
-def test_number_of_panels_has_a_range(deformed: thud.Impact, count: int, allowed: bool) -> None:  # noqa: FBT001
-    if allowed:
-        assert thud.plot.motion(deformed, count).axes
-    else:
-        with pytest.raises(thud.InputError, match=naming("instants", count, 1, 30)):
-            thud.plot.motion(deformed, count)
 
 
 def test_case_has_the_figures_of_its_results(deformed: thud.Impact) -> None:

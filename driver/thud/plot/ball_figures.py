@@ -12,12 +12,12 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.patheffects import withStroke
 
-from thud.base.checks import require_kind, require_mapping, require_whole
-from thud.base.errors import InputError
+from thud.base.checks import refuse, require_kind, require_mapping
 from thud.base.files import replace_file
 from thud.impact.compression import CompressionCurve
 from thud.impact.free_modes import FreeModes
 from thud.impact.impact import Impact
+from thud.impact.motion import require_ending
 from thud.plot.style import (
     WIDTH,
     add_colorbar,
@@ -40,10 +40,9 @@ if TYPE_CHECKING:
 
     from thud.impact.motion import Motion
 
-# Maximum number of panels that are readable at column width.
-MAX_PANELS = 30
-# Instants of the paper's figure 5.
+# Instants of the paper's figure 5, and panels side by side.
 INSTANTS = 9
+COLUMNS = 3
 # Nodes between two arrows, from pole to pole and through the wall.
 ARROWS = (6, 4)
 FRAMES_PER_SECOND = 12
@@ -64,32 +63,17 @@ def _draw_section(
 
 
 @own_style()
-def motion(impact: Impact, instants: int = INSTANTS) -> Figure:
-    """Draw instants of the impact: displacement by color, velocity by arrows (paper, figure 5).
+def motion(impact: Impact) -> Figure:
+    """Draw nine instants of the impact, from first touch to release (paper, figure 5).
 
-    Parameters
-    ----------
-    impact
-        An impact with snapshots.
-    instants
-        Number of instants, evenly spaced from first touch to release.
-
-    Returns
-    -------
-    Figure
-        Half sections above the floor; displacement since first touch in mm, time in ms.
-
-    Raises
-    ------
-    InputError
-        If the impact has no snapshots, or there are too many instants.
+    Half sections above the floor show the displacement since first touch, mm, by color and the
+    velocity by arrows. Raise InputError if the impact has no snapshots.
     """
     snapshots = _snapshots(impact)
-    require_whole("instants", instants, 1, MAX_PANELS)
-    times = impact.touch_time + np.linspace(0, impact.contact_time, instants)
+    times = impact.touch_time + np.linspace(0, impact.contact_time, INSTANTS)
     # There are fewer panels if there are fewer snapshots than instants.
     chosen = sorted({int(np.argmin(np.abs(snapshots.time - time))) for time in times})
-    figure, panels = panel_grid(len(chosen), 3, 1.6)
+    figure, panels = panel_grid(len(chosen), COLUMNS, 1.6)
     scale = _scale(snapshots, chosen)
     depth = snapshots.floor_displacement[chosen].max()
     for axes, i in zip(panels, chosen, strict=True):
@@ -103,23 +87,10 @@ def motion(impact: Impact, instants: int = INSTANTS) -> Figure:
 def animate(impact: Impact, path: str | os.PathLike[str]) -> None:
     """Save the motion of the ball as an animated GIF, one picture for each snapshot.
 
-    Parameters
-    ----------
-    impact
-        An impact with snapshots.
-    path
-        Path of the file, which ends with ``.gif``.
-
-    Raises
-    ------
-    InputError
-        If the impact has no snapshots, or the path does not end with ``.gif``.
-    OSError
-        If the file cannot be written.
+    Raise InputError if the impact has no snapshots, or the path does not end with ``.gif``, and
+    OSError if the file cannot be written.
     """
-    if Path(path).suffix.lower() != ".gif":
-        message = f"{path}: this ending is not known; allowed: .gif"
-        raise InputError(message)
+    require_ending(path, ".gif")
     snapshots = _snapshots(impact)
     figure, axes = empty_axes(WIDTH)
     count = len(snapshots.time)
@@ -143,10 +114,7 @@ def _snapshots(impact: Impact) -> Motion:
     """Return the snapshots of an impact; raise InputError if it has none."""
     require_kind("impact", impact, Impact)
     if impact.motion is None:
-        message = (
-            "the impact has no snapshots; allowed: a model with snapshots, snapshot_interval > 0"
-        )
-        raise InputError(message)
+        refuse("the impact has no snapshots", "a model with snapshots, snapshot_interval > 0")
     return impact.motion
 
 
@@ -177,16 +145,11 @@ def _draw_instant(axes: Axes, impact: Impact, i: int, scale: Normalize, depth: f
     velocity_scale = 3 * impact.impact_velocity / radius
     above_floor = start[:, 1] + velocity[:, 1] / velocity_scale >= floor
     arrows = axes.quiver(
-        *start[above_floor].T,
-        *velocity[above_floor].T,
-        angles="xy",
-        scale_units="xy",
-        scale=velocity_scale,
-        width=0.014,
-        color="0.1",
+        *start[above_floor].T, *velocity[above_floor].T, angles="xy", scale_units="xy",
+        scale=velocity_scale, width=0.014, color="0.1",
         # A light edge shows arrows on dark colors.
         path_effects=[withStroke(linewidth=1, foreground="white")],
-    )
+    )  # fmt: skip
     lowest = -depth - 0.12 * radius
     axes.fill_between([-0.05 * radius, 1.4 * radius], lowest, floor, color="0.6", linewidth=0)
     elapsed = 1e3 * (snapshots.time[i] - impact.touch_time)
@@ -213,26 +176,13 @@ def _add_key(axes: Axes, arrows: Quiver, impact: Impact) -> None:
 
 
 @own_style()
-def mode_shapes(modes: FreeModes, columns: int = 3) -> Figure:
+def mode_shapes(modes: FreeModes) -> Figure:
     """Draw mode shapes as half sections, with the outline of the ball at rest (paper, figure 4).
 
-    Parameters
-    ----------
-    modes
-        The modes.
-    columns
-        Shapes side by side.
-
-    Returns
-    -------
-    Figure
-        One half section for each mode; the color is the displacement divided by its maximum.
+    The color is the displacement divided by its maximum.
     """
     require_kind("modes", modes, FreeModes)
-    require_whole("columns", columns, 1, MAX_PANELS)
-    # More than three shapes side by side are wider than a column.
-    width = WIDTH * max(1, columns / 3)
-    figure, panels = panel_grid(len(modes.frequency), columns, 1.75, width=width)
+    figure, panels = panel_grid(len(modes.frequency), COLUMNS, 1.75)
     radius = modes.ball.outer_radius
     scale = Normalize(0, 1)
     for axes, frequency, harmonic, shape in zip(

@@ -4,13 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from thud.base._schema import (
-    BandSet,
-    LevelsForce,
-    LevelsMethod,
-    Limits,
-    LimitsSource,
-)
+from thud.base._schema import BandSet, LevelsForce, Limits, LimitsSource
 from thud.base.checks import refuse
 from thud.impact.contact_time import contact_force
 from thud.level.assessment import octave_limits
@@ -77,11 +71,9 @@ def draw_forces(axes: Axes, impacts: Mapping[str, Curve], force: LevelsForce | N
 
 @own_style()
 def levels(
-    impacts: Mapping[str, Impact],
-    force: LevelsForce | None = None,
+    impacts: Mapping[str, Impact], force: LevelsForce | None = None,
     source: LimitsSource | None = None,
-    method: LevelsMethod | None = None,
-) -> Figure:
+) -> Figure:  # fmt: skip
     """Draw octave levels with the tolerance band of the standards (paper, figure 3).
 
     One-third-octave bands, which have no limits, are drawn below if a case asks for them.
@@ -94,8 +86,6 @@ def levels(
         ``"floor"`` or ``"elastic"`` (the paper's ball force); by default that of each case.
     source
         ``"rubber_ball"`` or ``"tyre"``: source of the limits; by default that of the cases.
-    method
-        ``"exact"`` or ``"fft"``; by default that of each case.
 
     Returns
     -------
@@ -107,25 +97,22 @@ def levels(
     bands: list[BandSet] = ["octave"] if requested == {"octave"} else ["octave", "third"]
     figure = new_figure(0.4 + 2.5 * len(bands))
     panels = dict(zip(bands, figure.subplots(len(bands), 1, squeeze=False)[:, 0], strict=True))
-    draw_levels(panels, impacts, force, common_source(impacts, source), method)
+    draw_levels(panels, impacts, force, common_source(impacts, source))
     legend_above(panels["octave"])
     return figure
 
 
 def draw_levels(
-    panels: Mapping[BandSet, Axes],
-    impacts: Mapping[str, Curve],
-    force: LevelsForce | None,
+    panels: Mapping[BandSet, Axes], impacts: Mapping[str, Curve], force: LevelsForce | None,
     source: LimitsSource,
-    method: LevelsMethod | None = None,
-) -> None:
+) -> None:  # fmt: skip
     """Draw levels in the axes of their bands; octaves also show the tolerances."""
     curves, name = assessed_curves(impacts, force)
     title = f"Tolerance, {source.replace('_', ' ')}"
     tolerance_boxes(panels["octave"], *octave_limits(source), title)
     for bands, axes in panels.items():
-        levels = {key: i.levels(bands, method, kind) for key, (i, kind) in curves.items()}
-        add_levels(axes, levels, bands)
+        values = {name: i.levels(bands, force=kind) for name, (i, kind) in curves.items()}
+        add_levels(axes, values, bands)
         axes.set_ylabel(level_label(name))
 
 
