@@ -99,20 +99,13 @@ def with_values(case: Case, values: Mapping[str, object]) -> Case:
     return dataclasses.replace(case, **changed)
 
 
-def value_in(case: Case, name: str) -> Value | None:
-    """Return the value of a key in a case; None if there is no value or a list."""
+def value_in(case: Case, name: str) -> Any:  # noqa: ANN401 - of the type of the key
+    """Return the value of a key in a case, or of the standard ball; None if it is none or a list."""
     key, entry = find_key(name, case)
     value = getattr(getattr(case.resolved(), attribute_of(key)), key.name, None)
     if isinstance(value, tuple) and entry:
         value = next(iter(value[entry - 1 :]), None)
     return value if isinstance(value, Value) else None
-
-
-def number_in(case: Case, name: str) -> float:
-    """Return the number of a key in a case, or of the standard ball where it is None."""
-    value = value_in(case, name)
-    assert isinstance(value, float | int)  # noqa: S101 - for the type checker
-    return value
 
 
 def humanize(name: str) -> str:

@@ -12,7 +12,7 @@ from thud.base._schema import MET_FROM, VERDICTS
 from thud.base.checks import refuse
 from thud.base.errors import ThudError
 from thud.case.constructions import constructions
-from thud.case.keys import find_key, limits, number_in, with_values
+from thud.case.keys import find_key, limits, value_in, with_values
 from thud.explorer.answer import new_case
 from thud.explorer.criteria import model_headline
 from thud.explorer.form import field_of, lower, shown
@@ -129,7 +129,7 @@ def _improve_floor(case: Case) -> Work:
             if last.verdict == VERDICTS[0]:
                 changes.append(_change(case, name, value, f": {last}"))
             best = min((entry for _, entry in entries), key=lambda entry: entry.rating.level)
-            field, start = field_of(case, name), number_in(case, name)
+            field, start = field_of(case, name), value_in(case, name)
             ends = f"{shown(field, start, unit=False)} to {shown(field, value)}"
             tried.append(f"{lower(field['label'])} {ends}, {best}")
     if changes:
@@ -189,7 +189,7 @@ def _answer(
 def _tried(case: Case, name: str, factors: np.ndarray[Any, Any]) -> list[float]:
     """Return the value of a key times factors, rounded, as far as they are allowed."""
     low, high = limits(find_key(name, case)[0], case)
-    values = (float(f"{value:.{DIGITS}g}") for value in number_in(case, name) * factors)
+    values = (float(f"{value:.{DIGITS}g}") for value in value_in(case, name) * factors)
     return [value for value in values if low < value < high]
 
 
@@ -197,7 +197,7 @@ def _layer_values(case: Case, name: str) -> list[float]:
     """Return the values of a layer that are tried."""
     if name == STIFFNESS:
         return _tried(case, name, 0.9**LAYER_STEPS)
-    factors = 1 + 0.01 * LAYER_STEPS / number_in(case, name)
+    factors = 1 + 0.01 * LAYER_STEPS / value_in(case, name)
     return _tried(case, name, factors[factors <= 2])  # noqa: PLR2004 - twice as thick
 
 
@@ -215,7 +215,7 @@ def _constructions(case: Case) -> dict[str, Case]:
 
 def _change(case: Case, name: str, value: float, reached: str = "") -> dict[str, Any]:
     """Return a change of a key for the page."""
-    field, start = field_of(case, name), number_in(case, name)
+    field, start = field_of(case, name), value_in(case, name)
     percent = f"{100 * (value / start - 1):+.1f}".replace("-", "−")
     instead = f"{shown(field, value)} instead of {shown(field, start)} ({percent} %)"
     return {

@@ -15,7 +15,7 @@ from thud.base.checks import refuse, refuse_value, require_array, require_number
 from thud.base.errors import FitWarning, NumericalError
 from thud.base.note import Note
 from thud.case.case import Case, new_model
-from thud.case.keys import number_in
+from thud.case.keys import value_in
 from thud.impact.compression import CompressionCurve, compress
 from thud.studies.fitting.alternatives import PRESS_UNKNOWNS, require_unknowns
 from thud.studies.fitting.estimates import Estimates
@@ -172,7 +172,7 @@ def fit_compression(  # noqa: PLR0913 - as in `compress`
     require_unknowns(unknowns, PRESS_UNKNOWNS)
     _require_gain(gain)
     problem = _Problem(
-        case.ball, number_in(case, "youngs_modulus"), model, gas, measured, measured_force,
+        case.ball, value_in(case, "youngs_modulus"), model, gas, measured, measured_force,
         tuple(unknowns), gain,
     )  # fmt: skip
     first = problem.curve(problem.modulus)
