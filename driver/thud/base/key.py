@@ -54,7 +54,8 @@ class Key:
             return ", ".join(map(repr, self.choices))
         if self.lower == -math.inf:
             return {"flag": "True or False"}.get(self.kind, "plain text in one line")
-        low, high = (e if isinstance(e, str) else f"{e:g}" for e in (self.lower, self.upper))
+        ends = (e if isinstance(e, str) else f"{e:.7g}" for e in (self.lower, self.upper))
+        low, high = (end.replace("e+", "e") for end in ends)
         signs = ["<" if is_open else "<=" for is_open in (self.lower_open, self.upper_open)]
         whole = ", whole" if self.whole or self.kind == "whole" else ""
         return f"{low} {signs[0]} {self.name} {signs[1]} {high} {self.unit}".rstrip() + whole
