@@ -208,13 +208,6 @@ def test_library_is_filtered_by_words() -> None:
         thud.constructions("marble")
 
 
-def test_rows_state_value_unit_and_source() -> None:
-    rows = {row[0]: row[1:] for row in thud.construction("concrete 180, ceiling").rows()}
-    assert rows["thickness"] == ("0.18", "m", "nominal")
-    assert rows["ceiling_mass"] == ("9", "kg/m2", "estimate: 12.5 mm of gypsum board")
-    assert rows["edges"][0] == "building"
-
-
 def test_section_is_to_scale_and_names_each_layer() -> None:
     entry = thud.construction("joists, 3 boards, rigid subceiling")
     figure = entry.plot()

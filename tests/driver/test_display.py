@@ -35,7 +35,7 @@ def results(impact: thud.Impact) -> list[Displayed]:
         thud.compare({"one": impact, "two": record}),
     ]
     basics = [impact, judged, many, modes, record, thud.get_bands("third")]
-    return [*basics, thud.Case(modes=thud.Modes()), *studies]
+    return [*basics, *studies]
 
 
 def test_results_have_a_line_and_a_table(flagship: thud.Impact) -> None:
@@ -112,10 +112,10 @@ def test_warnings_are_shown() -> None:
     assert odd.warnings
 
 
-def test_html_is_escaped() -> None:
-    case = thud.Case("<script>&")
-    assert "<script>" not in case._repr_html_()
-    assert "&lt;script&gt;&amp;" in case._repr_html_()
+def test_html_is_escaped(flagship: thud.Impact) -> None:
+    shown = thud.compare({"<script>&": flagship})._repr_html_()
+    assert "<script>" not in shown
+    assert shown.count("&lt;script&gt;&amp;") == 2
 
 
 def test_figure_shows_force_and_levels(flagship: thud.Impact) -> None:

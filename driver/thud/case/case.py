@@ -34,11 +34,9 @@ from thud.base.checks import (
     refuse_unknown,
     require_choice,
     require_kind,
-    suggestion,
 )
-from thud.base.display import Displayed
 from thud.base.files import replace_file
-from thud.base.immutable import plain
+from thud.base.immutable import Immutable, plain
 from thud.base.toml_tables import require_table
 
 if TYPE_CHECKING:
@@ -74,17 +72,12 @@ def new_model(model: str | ModelOptions | None, options: Mapping[str, object]) -
             refuse(problem, "options in the object, or as keywords with the name of a model")
         return model
     model = require_choice("&model: name", ModalBall.name if model is None else model, MODELS)
-    known = [option.name for option in fields(MODELS[model])]
-    for word in options.keys() - known:
-        owners = dict.fromkeys(key.owner or f"&{key.group}" for key in KEYS if key.name == word)
-        hint = suggestion(word, [*known, *_NAMES["sampling"]])
-        of = f", but of {' and '.join(owners)}" if owners else hint
-        refuse(f"{word!r} is no option of {model}{of}", ", ".join(known))
+    refuse_unknown(f"options of {model}", options, [field.name for field in fields(MODELS[model])])
     return MODELS[model](**options)  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True, repr=False)
-class Case(Displayed):
+class Case(Immutable):
     """Input of one run.
 
     Attributes
@@ -139,14 +132,6 @@ class Case(Displayed):
         room = "room below" if self.room else ""
         press = "quasi-static compression" if self.compression else ""
         return f"<Case {self.name}: {', '.join(filter(None, (model, floor, modes, room, press)))}>"
-
-    def rows(self) -> list[tuple[str, ...]]:
-        """Return header and rows of text."""
-        entries = self.resolved().entries()
-        rows = [
-            (key.owner or key.group, key.name, str(value), key.unit) for key, value, _ in entries
-        ]
-        return [("group", "key", "value", "unit"), *rows]
 
     def entries(self) -> Iterator[tuple[Key, object, float | None]]:
         """Yield each key that the case has, but its name, with the value.

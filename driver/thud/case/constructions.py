@@ -19,9 +19,9 @@ from thud.base.checks import (
     shown,
     suggestion,
 )
-from thud.base.display import Displayed
 from thud.base.errors import InputError
 from thud.base.files import inputs_folder
+from thud.base.immutable import Immutable
 from thud.base.toml_tables import (
     TomlTable,
     between,
@@ -66,7 +66,7 @@ class Layer(TomlTable):
 
 
 @dataclass(frozen=True, repr=False)
-class Construction(Displayed):
+class Construction(Immutable):
     """A floor construction.
 
     Attributes
@@ -134,19 +134,6 @@ class Construction(Displayed):
             if "length" in self.sources:
                 length = self.floor.length
         return replace(result, room=room, floor=replace(self.floor, length=length, width=width))
-
-    def rows(self) -> list[tuple[str, ...]]:
-        """Return header and a row of text for each stated key."""
-        rows: list[tuple[str, ...]] = [("key", "value", "unit", "source")]
-        for name, source in self.sources.items():
-            in_room = name in self.room
-            value = self.room[name] if in_room else getattr(self.floor, name)
-            values = value if isinstance(value, tuple) else (value,)
-            text = ", ".join(f"{v:g}" if isinstance(v, float) else str(v) for v in values)
-            rows.append(
-                (name, text, (Room if name in self.room else self.floor).keys[name].unit, source)
-            )
-        return rows
 
     def plot(self) -> Figure:
         """Draw the section of the floor with its layers."""
