@@ -57,11 +57,6 @@ def test_results_are_read_back_to_the_last_bit(run: Run, case_file: CaseFile, te
     assert same(found, thud.solve(found.case))
 
 
-def test_results_that_are_none_are_told(tmp_path: Path) -> None:
-    with pytest.raises(thud.InputError, match=naming(tmp_path)):
-        thud.read_results(tmp_path)
-
-
 def areas(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
     """Return the areas of cells, positive if their nodes run counterclockwise."""
     x, y = points[cells, :2].transpose(2, 0, 1)
@@ -223,52 +218,25 @@ def test_pressure_is_even_at_the_pole() -> None:
     assert 0 < missing[1] < missing[0] < 0.1
 
 
-BAD = {
-    "&mesh radial_elements = -1 /": naming("&mesh: radial_elements", -1),
-    "&mesh polar_elements = 7 /": naming("&mesh: polar_elements", 7),
-    "&material prony_share = -0.1, prony_time = 1e-3, viscosity = 'prony' /": naming("prony_share"),
-    "&material prony_share = 0.1, prony_time = 0, viscosity = 'prony' /": naming("prony_time"),
-    "&material prony_share = 0.1, 0.2, prony_time = 1e-3, viscosity = 'prony' /": naming(
-        "prony_share", "prony_time"
-    ),
-    "&material viscosity = 'prony' /": naming("prony_share", "prony_time"),
-    "&material prony_share = 0.1, prony_time = 1e-3 /": naming("prony_share", "viscosity"),
-    "&material viscosity = 'constant_loss', loss_factor = 1 /": naming("&material", "loss_factor"),
-    "&material bulk_ratio = 1e9 /": naming("&material: bulk_ratio"),
-    "&contact friction = -0.1 /": naming("&contact: friction"),
-    "&finite_element flight_before = 0.9 /": naming("&finite_element: flight_before", "0.9 s"),
-    "&finite_element bounces = 3 /": naming("contact 3"),
-    "&finite_element step_safety = 1.5 /": naming("&finite_element: step_safety"),
-    "&mesh radial_elements = 1 /": naming("&mesh: radial_elements", 2),
-    "&sampling sample_rate = 8000 /": naming("&sampling: sample_rate", "16000.0 Hz"),
-    "&sampling duration = 0.01 /": naming("&sampling: duration", "0.01 s"),
-    "&output snapshot_interval = 1e-9 / &sampling sample_rate = 1e7, duration = 0.4 /": naming(
-        "snapshots"
-    ),
-    "&modes count = 101 /": naming("&modes: count", 101),
-    "&hollow_sphere momentum_flux = 'none' /": naming("&hollow_sphere", "line"),
-}
-
-
-@pytest.mark.parametrize("group", BAD)
-def test_bad_input_gets_one_sentence(group: str) -> None:
-    mesh = "" if "&mesh" in group else MESH
-    text = f"&ball /\n&drop /\n&model name = 'finite_element' /\n{mesh}{group}\n"
-    check_refusal(text, BAD[group])
-
-
 @pytest.mark.parametrize(
     ("text", "words"),
     [
+        (IMPACT.replace("elements = 2", "elements = 1"), naming("&mesh: radial_elements", 2)),
+        (f"{IMPACT}&material bulk_ratio = 1e9 /", naming("&material: bulk_ratio")),
+        (f"{IMPACT}&contact friction = -0.1 /", naming("&contact: friction")),
+        (
+            f"{IMPACT}&finite_element flight_before = 0.9 /",
+            naming("&finite_element: flight_before", "0.9 s"),
+        ),
+        (f"{IMPACT}&finite_element bounces = 3 /", naming("contact 3")),
+        (f"{IMPACT}&sampling duration = 0.01 /", naming("&sampling: duration", "0.01 s")),
+        (f"{IMPACT}&modes count = 101 /", naming("&modes: count", 101)),
+        (f"{IMPACT}&hollow_sphere momentum_flux = 'none' /", naming("&hollow_sphere", "line")),
         ("&ball /\n&modes /\n&drop /\n", naming("&drop", "line 3", "&modes")),
         ("&ball /\n&modes /\n&mesh /\n", naming("&mesh", "line 3", "&modes")),
-        (
-            "&ball wall_thickness = 8e-5 /\n&modes /\n",
-            naming("wall_thickness", "8.9e-5"),
-        ),
+        ("&ball wall_thickness = 8e-5 /\n&modes /\n", naming("wall_thickness", "8.9e-5")),
         ("&modes /\n&mdel /\n", naming("&mdel", "line 2", "'model'")),
         ("&ball /\n&drop /\n&model /\n&mesh /\n", naming("&mesh", "line 4")),
-        (IMPACT.replace("&ball", "&ball gauge_pressure = 1e4"), naming("&ball: gauge_pressure")),
         (IMPACT.replace("&ball", "&ball youngs_modulus = 1e3"), naming("duration", "0.05 s")),
         (IMPACT.replace("&drop", "&drop height = 1e3"), naming("&finite_element", "ms")),
         (
@@ -279,11 +247,8 @@ def test_bad_input_gets_one_sentence(group: str) -> None:
     ],
 )
 def test_impossible_cases_get_one_sentence(text: str, words: str) -> None:
-    check_refusal(text, words)
-
-
-def check_refusal(text: str, words: str) -> None:
-    Path("case.nml").write_text(text, encoding="utf-8")
+    """Ranges, lists of branches, rates and snapshots are those of the Fortran tests."""
+    Path("case.nml").write_text(f"{text}\n", encoding="utf-8")
     with pytest.raises(thud.ThudError, match=words) as caught:
         thud.solve(thud.read_case("case.nml"))
     assert "\n" not in str(caught.value)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -140,19 +140,20 @@ def test_silence_between_bands_has_the_level_of_rounding() -> None:
     assert levels[-1] < total - 140
 
 
-def test_verdict_needs_five_levels() -> None:
-    with pytest.raises(thud.InputError, match=naming("levels", 4, 5)):
-        thud.assess_levels([1, 2, 3, 4], 0.02, 0.8, 1, 2.5, 1.0)
-    with pytest.raises(
-        thud.InputError, match=naming("source", "'hammer'", "'rubber_ball'", "'tyre'")
-    ):
-        thud.assess_levels([1, 2, 3, 4, 5], 0.02, 0.8, 1, 2.5, 1.0, source="hammer")
-
-
-@pytest.mark.parametrize("value", [[0.02, 3], 1j, "soon", None, 10**400], ids=type)
-def test_criteria_are_single_numbers(value: object) -> None:
-    with pytest.raises(thud.InputError, match=naming("contact_time", "number")):
-        thud.assess_levels([39, 31, 23, 17, 12.5], value, 0.8, 1, 2.5, 1.0)  # type: ignore[arg-type]
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"levels": [1, 2, 3, 4]}, naming("levels", 4, 5)),
+        ({"source": "hammer"}, naming("source", "'hammer'", "'rubber_ball'", "'tyre'")),
+        *(
+            ({"contact_time": value}, naming("contact_time", "number"))
+            for value in ([0.02, 3], 1j, "soon", None, 10**400)
+        ),
+    ],
+)
+def test_verdict_needs_five_levels_and_numbers(change: dict[str, Any], words: str) -> None:
+    with pytest.raises(thud.InputError, match=words):
+        thud.assess_levels(**({"levels": [39, 31, 23, 17, 12.5]} | change))
 
 
 def test_nominal_tyre_conforms() -> None:
