@@ -15,6 +15,7 @@ from thud.base.bridge import compiler, version, without_units
 from thud.base.extras import require_extra
 from thud.base.key import Quantity
 from thud.base.note import Note
+from thud.case.case import case_text
 from thud.case.keys import find_key
 from thud.level.levels import FORCES
 
@@ -79,12 +80,8 @@ def sample_warnings(
 ) -> tuple[Note, ...]:
     """Return warnings of samples without results, and of sources that do not conform.
 
-    Parameters
-    ----------
-    status, reason
-        Exit code and message of each sample, as in `Ensemble`, of any shape.
-    conforms
-        Whether each source conforms, of the same shape; None if levels in a room are not rated.
+    Status and reason are those of `Ensemble`, of any shape, and of the same shape is whether each
+    source conforms; None if levels in a room are not rated.
     """
     failed = status != 0
     result = []
@@ -196,7 +193,7 @@ def case_attributes(case: Case) -> dict[str, str]:
         "model": case.model.name if case.model else "",
         "assessed_force": case.levels.force,
         "limits": case.limits.source,
-        "case": f"{case.to_namelist()}",
+        "case": case_text(case).decode(errors="surrogateescape"),
         "resolved_case": f"{case.resolved().to_namelist()}",
         "thud_version": version(),
         "compiler": compiler(),
