@@ -100,7 +100,7 @@ def with_values(case: Case, values: Mapping[str, object]) -> Case:
 
 
 def value_in(case: Case, name: str) -> Any:  # noqa: ANN401 - of the type of the key
-    """Return the value of a key in a case, or of the standard ball; None if it is none or a list."""
+    """Return the value of a key in a case or of the standard ball; None if there is none."""
     key, entry = find_key(name, case)
     value = getattr(getattr(case.resolved(), attribute_of(key)), key.name, None)
     if isinstance(value, tuple) and entry:
