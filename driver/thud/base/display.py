@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from contextlib import contextmanager
 from html import escape
 from itertools import chain, repeat
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -53,6 +53,9 @@ class Displayed(Immutable, ABC):
 class Tabulated(Displayed):
     """Base of results that are a table of values: all its forms follow from `columns`."""
 
+    # Whether texts have about ten rows at equal distances, as of histories and spectra.
+    is_curve: ClassVar[bool] = False
+
     @abstractmethod
     def columns(self) -> Columns:
         """Return numbers or texts, shape (n_row,), and their format by titles with units."""
@@ -64,7 +67,8 @@ class Tabulated(Displayed):
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text; the text of NaN is empty."""
-        return column_rows(self.columns())
+        header, *rows = column_rows(self.columns())
+        return [header, *rows[:: max(1, len(rows) // 10) if self.is_curve else 1]]
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the table, with columns such as ``"level_dB"``.

@@ -14,13 +14,13 @@ import numpy as np
 
 from thud.base.bridge import version
 from thud.base.checks import refuse, require_kind, require_whole
+from thud.base.display import Tabulated
 from thud.base.extras import library
 from thud.base.files import replace_file
 from thud.base.note import Note
 from thud.base.tables import csv_text
 from thud.case.case import case_text
 from thud.export.wav import wav_file
-from thud.impact.curve import Curve
 from thud.level.assessment import ImpactOrRecording
 from thud.recordings.recording import Recording
 
@@ -46,7 +46,7 @@ UFF_NAME = 10
 
 
 @dataclass(frozen=True, eq=False)
-class BlockedForce(Curve):
+class BlockedForce(Tabulated):
     """Force of one drop on a rigid floor with its origin, for other programs.
 
     Attributes
@@ -71,6 +71,7 @@ class BlockedForce(Curve):
         Processing of the force.
     """
 
+    is_curve = True
     name: str
     force: NDArray[np.float64]
     sample_rate: float

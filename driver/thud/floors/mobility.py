@@ -10,11 +10,11 @@ import numpy as np
 from thud.base._schema import FloorOptions
 from thud.base.bridge import ask
 from thud.base.checks import refuse, refuse_value, require_array, require_kind, require_pair
+from thud.base.display import Tabulated
 from thud.base.files import replace_file
 from thud.base.note import Note
 from thud.base.tables import csv_text
 from thud.case.case import Case, case_text
-from thud.impact.curve import Curve
 from thud.level.levels import finite_array
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ _PLAUSIBLE = (1e-7, 1e-3)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Mobility(Curve):
+class Mobility(Tabulated):
     """Mobility against frequency, of a floor or measured.
 
     Called with frequencies, Hz, it returns the mobilities there: those of the floor, or between
@@ -52,6 +52,7 @@ class Mobility(Curve):
         Position along length and width of the floor, m; None: at the source.
     """
 
+    is_curve = True
     frequency: NDArray[np.float64]
     values: NDArray[np.complex128]
     name: str = "measurement"

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from thud.base._schema import Ball, Compression
 from thud.base.bridge import ask, without_units
+from thud.base.display import Tabulated
 from thud.case.case import Case, case_text, new_model
-from thud.impact.curve import Curve
 
 if TYPE_CHECKING:
     import numpy as np
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class CompressionCurve(Curve):
+class CompressionCurve(Tabulated):
     """Force and deflection of a ball between two rigid plates without friction.
 
     Attributes
@@ -35,6 +35,7 @@ class CompressionCurve(Curve):
         Force on each plate, N.
     """
 
+    is_curve = True
     case: Case
     deflection: NDArray[np.float64]
     force: NDArray[np.float64]

@@ -128,11 +128,10 @@ def compute(case: Case) -> Impact:
 def new_impact(case: Case, answer: Bundle) -> Impact:
     """Return the impact from a bundle of the library."""
     fields = _fields(case, answer)
-    is_mobile = "floor_force" in answer
     return Impact(
         **fields,
         notes=notes(answer["warnings"]) if "warnings" in answer else (),
-        on_floor=new_floor_impact(case, answer, fields["floor_force"]) if is_mobile else None,
+        on_floor=new_floor_impact(case, answer, fields["floor_force"]),
         room_level=new_room_level(answer) if "room" in answer else None,
     )
 
