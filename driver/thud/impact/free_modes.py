@@ -66,19 +66,10 @@ class FreeModes(Tabulated):
         return f"<FreeModes: {', '.join(f'{f:.2f}' for f in self.frequency)} Hz>"
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the shapes for ParaView.
+        """Write the shapes for ParaView to a VTU file; an existing one is replaced.
 
-        Parameters
-        ----------
-        path
-            Path of the file, which ends with ``.vtu``. An existing file is replaced.
-
-        Raises
-        ------
-        InputError
-            If the path does not end with ``.vtu``, or meshio is not installed.
-        OSError
-            If the file cannot be written.
+        Raise InputError if the path does not end with ``.vtu`` or meshio is not installed, and
+        OSError if the file cannot be written.
         """
         names = (f"mode {i}, {f:.3f} Hz" for i, f in enumerate(self.frequency, 1))
         write_vtu(path, self.start, dict(zip(names, self.shape, strict=True)))
@@ -98,10 +89,7 @@ class FreeModes(Tabulated):
         }
 
 
-def free_modes(
-    ball: Ball | None = None,
-    count: int = Modes.count,
-) -> FreeModes:
+def free_modes(ball: Ball | None = None, count: int = Modes.count) -> FreeModes:
     """Compute the lowest free modes of a ball: those of the hollow sphere, to ten digits.
 
     Parameters
@@ -128,11 +116,7 @@ def free_modes(
     PlausibilityWarning
         For each entry of `FreeModes.notes`.
     """
-    case = Case(
-        ball=Ball() if ball is None else ball,
-        model=None,
-        modes=Modes(count),
-    )
+    case = Case(ball=Ball() if ball is None else ball, model=None, modes=Modes(count))
     modes = new_modes(case.ball, ask("solve", case=case_text(case)))
     for note in modes.notes:
         warnings.warn(PlausibilityWarning(note), stacklevel=3)

@@ -65,18 +65,9 @@ class Motion(Immutable):
     def save(self, path: str | os.PathLike[str]) -> list[Path]:
         """Write the snapshots for ParaView: a VTU file each, and their index; return the paths.
 
-        Parameters
-        ----------
-        path
-            Path of the index, which ends with ``.pvd``. The files of the snapshots are beside it:
-            those of ``ball.pvd`` are ``ball_0001.vtu`` and so on. Existing files are replaced.
-
-        Raises
-        ------
-        InputError
-            If the path does not end with ``.pvd``, or meshio is not installed.
-        OSError
-            If a file cannot be written.
+        The files of the snapshots are beside the index: those of ``ball.pvd`` are ``ball_0001.vtu``
+        and so on. Existing files are replaced. Raise InputError if the path does not end with
+        ``.pvd`` or meshio is not installed, and OSError if a file cannot be written.
         """
         index = require_ending(path, ".pvd")
         files = [index.with_name(f"{index.stem}_{i:04d}.vtu") for i in range(1, len(self.time) + 1)]
@@ -131,14 +122,8 @@ def write_vtu(
 ) -> None:
     """Write a VTU file of quadrilaterals; distance from the axis and height become x and y.
 
-    Parameters
-    ----------
-    path
-        Path of the file, which ends with ``.vtu``; raise InputError otherwise.
-    position : ndarray, shape (n_line, n_ring, 2)
-        Positions of the nodes, m.
-    values
-        Values at the nodes by name, shape (n_line, n_ring) or, of vectors, (n_line, n_ring, 2).
+    The nodes have positions, m, shape (n_line, n_ring, 2), and values by name, of this shape or, of
+    scalars, (n_line, n_ring). Raise InputError if the path does not end with ``.vtu``.
     """
     target = require_ending(path, ".vtu")
     meshio = library("meshio", "meshes")

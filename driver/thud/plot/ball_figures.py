@@ -202,24 +202,9 @@ def mode_shapes(modes: FreeModes) -> Figure:
 
 @own_style()
 def compression(curves: Mapping[str, CompressionCurve], ax: Axes | None = None) -> Figure:
-    """Draw forces against the approach of the plates.
+    """Draw forces, N, against the approach of the plates, mm, by their names in the legend.
 
-    Parameters
-    ----------
-    curves
-        Curves by their names in the legend.
-    ax
-        Axes, by default those of a new figure.
-
-    Returns
-    -------
-    Figure
-        Approach of the plates in mm, force in N.
-
-    Raises
-    ------
-    InputError
-        If `curves` is not a mapping of names to curves, or empty.
+    They are drawn in a new figure or the stated axes. Raise InputError if there are no curves.
     """
     require_mapping("curves", curves, "curves")
     for name, curve in curves.items():
