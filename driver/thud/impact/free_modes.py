@@ -10,11 +10,13 @@ import numpy as np
 
 from thud.base._schema import Ball, FiniteElement, Modes
 from thud.base.bridge import ask, notes, without_units
-from thud.base.checks import refuse, require_array, require_kind
+from thud.base.checks import require_kind
 from thud.base.display import Tabulated
 from thud.base.errors import PlausibilityWarning
 from thud.case.case import Case, case_text
 from thud.impact.motion import write_vtu
+from thud.level.levels import finite_array
+from thud.level.rating import POSITIVE
 
 if TYPE_CHECKING:
     import os
@@ -153,8 +155,6 @@ def loss_factors(model: FiniteElement, frequency: ArrayLike) -> NDArray[np.float
         Loss modulus divided by storage modulus.
     """
     require_kind("model", model, FiniteElement)
-    frequencies = require_array("frequency", frequency, (1,), "iuf")
-    if not frequencies.size or not (frequencies > 0).all():
-        refuse("frequency is not allowed", "a list of frequencies above 0, Hz")
+    frequencies = finite_array("frequency", frequency, (1,), POSITIVE, "Hz")
     answer = ask("loss_factors", case=case_text(Case(model=model)), frequency=frequencies)
     return np.asarray(answer["loss_factors"])

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 # Maximum magnitude of a sound level, dB.
 MAX_LEVEL = 1000.0
-# Range of volumes, m3, and times, s: any that are positive.
+# Range of volumes, m3, times, s, and frequencies, Hz: any that are positive.
 POSITIVE = 1e-9, 1e9
 
 
