@@ -16,13 +16,7 @@ import thud
 from thud.base._schema import LIMITS
 from thud.level.assessment import Criterion, Verdict, octave_limits
 from thud.level.estimate import Estimate
-from thud.level.levels import (
-    BANDWIDTHS,
-    RECORDED_BAND,
-    SOURCES,
-    low_pass,
-    peak_count,
-)
+from thud.level.levels import BANDWIDTHS, RECORDED_BAND, SOURCES, low_pass, peak_count
 
 if TYPE_CHECKING:
     from thud.base._schema import LimitsSource

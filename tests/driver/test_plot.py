@@ -78,11 +78,7 @@ def test_figures_are_a_column_wide_and_whole(tmp_path: Path) -> None:
     assert figure.get_figwidth() == pytest.approx(WIDTH)
     for ending in ("png", "svg", "pdf"):
         thud.plot.save(figure, tmp_path / f"levels.{ending}")
-    assert names_in(tmp_path) == [
-        "levels.pdf",
-        "levels.png",
-        "levels.svg",
-    ]
+    assert names_in(tmp_path) == ["levels.pdf", "levels.png", "levels.svg"]
     with pytest.raises(thud.InputError, match=naming("levels.xyz", "png")):
         thud.plot.save(figure, tmp_path / "levels.xyz")
 

@@ -137,10 +137,7 @@ def test_threads_change_no_byte(run: Run, case: Path, tmp_path: Path) -> None:
         ("", naming("table.csv", "empty")),
         ("# nothing\n\n", naming("table.csv", "empty")),
         ("height\n", naming("table.csv", "samples")),
-        (
-            "hieght\n1\n",
-            naming("line 1", "'hieght'", "'height'", "'mass'"),
-        ),
+        ("hieght\n1\n", naming("line 1", "'hieght'", "'height'", "'mass'")),
         ("height,\n1,2\n", naming("line 1", "''", "'height'")),
         ("height,mass,height\n1,2,1\n", naming("line 1", "'height'")),
         ("height,mass\n1,2\n1\n", naming("line 3", 1, 2)),

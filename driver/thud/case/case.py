@@ -29,12 +29,7 @@ from thud.base._schema import (
     Unknowns,
 )
 from thud.base.bridge import ask
-from thud.base.checks import (
-    refuse,
-    refuse_unknown,
-    require_choice,
-    require_kind,
-)
+from thud.base.checks import refuse, refuse_unknown, require_choice, require_kind
 from thud.base.files import replace_file
 from thud.base.immutable import Immutable, plain
 from thud.base.toml_tables import require_table

@@ -11,14 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from thud.base._schema import FLOORS, FloorOptions, JoistFloor, RectangularFloor, Room
-from thud.base.checks import (
-    refuse,
-    refuse_unknown,
-    refuse_value,
-    require_kind,
-    shown,
-    suggestion,
-)
+from thud.base.checks import refuse, refuse_unknown, refuse_value, require_kind, shown, suggestion
 from thud.base.errors import InputError
 from thud.base.files import inputs_folder
 from thud.base.immutable import Immutable

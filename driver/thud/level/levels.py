@@ -80,10 +80,7 @@ def get_bands(bands: BandSet = "octave") -> Bands:
 
 
 def force_exposure_levels(
-    force: ArrayLike,
-    sample_rate: float,
-    bands: BandSet = "octave",
-    method: LevelsMethod = "exact",
+    force: ArrayLike, sample_rate: float, bands: BandSet = "octave", method: LevelsMethod = "exact"
 ) -> NDArray[np.float64]:
     """Return the force exposure levels of a force record.
 
