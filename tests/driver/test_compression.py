@@ -68,7 +68,7 @@ def test_gas_that_leaves_gives_no_force() -> None:
         ),
         ({"max_deflection": 0.178, "model": "hollow_sphere"}, naming("max_deflection", "0.178 m")),
         ({"max_deflection": 0.12, "model": "hollow_sphere"}, naming("max_deflection", "0.12 m")),
-        ({"max_deflection": 0.0}, naming("max_deflection", 0.0, "1.0e-15")),
+        ({"max_deflection": 0.0}, naming("max_deflection", 0.0, "1e-15")),
         ({"model": "modal_ball", "max_deflection": 0.15}, naming("ring")),
         ({"points": 1}, naming("points", 1, 2, 10000)),
         ({"gas": "hot"}, naming("gas", "'hot'", "'vented'", "'adiabatic'")),

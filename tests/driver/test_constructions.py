@@ -305,7 +305,7 @@ def test_command_compares_constructions_beside_cases(
     printed = capsys.readouterr()
     assert "mine: for tests" in printed.err
     (names,) = [line.split() for line in printed.out.splitlines() if "first" in line]
-    assert names == ["first", "concrete", "200", "mine"]
+    assert names == ["name", "first", "concrete", "200", "mine"]
     title = "500 Hz octave, dB"
     (levels,) = [line for line in printed.out.splitlines() if line.startswith(title)]
     first, library, mine = map(float, levels.removeprefix(title).split())

@@ -364,7 +364,8 @@ def assess_levels(  # noqa: PLR0913, PLR0917 - each is one criterion of the stan
         is not a number, or not a whole one for `peaks`.
     """
     # Arrays of other libraries yield scalars of their own.
-    octaves = [*(plain(np.asarray(levels)) if hasattr(levels, "__array__") else levels)]
+    is_array = hasattr(levels, "__array__")
+    octaves = [*(plain(np.atleast_1d(np.asarray(levels))) if is_array else levels)]
     nominal = get_bands(BANDWIDTHS[0]).nominal
     if len(octaves) != len(nominal):
         allowed = f"{len(nominal)}, the octaves {nominal[0]:g} to {nominal[-1]:g} Hz"
