@@ -85,7 +85,7 @@ def test_interpreters_without_a_lock_stay_so() -> None:
     [
         ({"model": "cube"}, naming("&model: name", "'cube'", "'hollow_sphere'")),
         ({"damping_law": "some"}, naming("&modal_ball: damping_law", "'some'", "'rising'")),
-        ({"stiffness": 1.0}, naming("'stiffness'", "modal_ball", "damping_law")),
+        ({"stiffness": 1.0}, naming("'stiffness'", "hunt_crossley", "oscillator")),
         ({"sample_rate": 0.0}, naming("&sampling: sample_rate", 0.0, 2000)),
         ({"duration": 0.01}, naming("&sampling: duration", "0.01 s")),
         ({"substeps": 0}, naming("&sampling: substeps", 0, 1, 10000)),

@@ -29,7 +29,7 @@ from thud.base._schema import (
     Unknowns,
 )
 from thud.base.bridge import ask
-from thud.base.checks import refuse, refuse_unknown, require_choice, require_kind
+from thud.base.checks import refuse, refuse_unknown, require_choice, require_kind, suggestion
 from thud.base.files import replace_file
 from thud.base.immutable import Immutable, plain
 from thud.base.toml_tables import require_table
@@ -67,7 +67,12 @@ def new_model(model: str | ModelOptions | None, options: Mapping[str, object]) -
             refuse(problem, "options in the object, or as keywords with the name of a model")
         return model
     model = require_choice("&model: name", ModalBall.name if model is None else model, MODELS)
-    refuse_unknown(f"options of {model}", options, [field.name for field in fields(MODELS[model])])
+    known = [option.name for option in fields(MODELS[model])]
+    for word in options.keys() - known:
+        owners = dict.fromkeys(key.owner or f"&{key.group}" for key in KEYS if key.name == word)
+        hint = suggestion(word, [*known, *_NAMES["sampling"]])
+        of = f", but of {' and '.join(owners)}" if owners else hint
+        refuse(f"{word!r} is no option of {model}{of}", ", ".join(known))
     return MODELS[model](**options)  # type: ignore[arg-type]
 
 
