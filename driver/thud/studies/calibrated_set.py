@@ -26,12 +26,9 @@ from thud.studies.unknowns import blocked_case, stated_unknowns
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
-
+    from thud.studies.arrays import Array, Columns
     from thud.studies.unknowns import Unknown
 
-    Values = NDArray[np.float64]
-    Columns = dict[str, Values]
 
 # Equally likely parameters of the standard ball, made by `./bootstrap calibrate`.
 FILE = "standard_ball.csv"
@@ -47,7 +44,7 @@ _ROUNDING = 1e-9
 
 
 @lru_cache(maxsize=4)
-def calibrated_set(model: str) -> Mapping[str, Values]:
+def calibrated_set(model: str) -> Mapping[str, Array]:
     """Return equally likely parameters of the standard ball by key; empty: a model without them."""
     lines = (resources.files("thud.studies") / FILE).read_text("utf-8").splitlines()
     rows = csv.DictReader(line for line in lines if not line.startswith("#"))
@@ -127,7 +124,7 @@ def assess(case: Case | Impact, *, progress: bool = False) -> Verdict:
     return _verdict(case, columns, values[~failed], fixed, notes)
 
 
-def _varied_set(case: Case, sets: Mapping[str, Values]) -> tuple[Columns, tuple[str, ...]]:
+def _varied_set(case: Case, sets: Mapping[str, Array]) -> tuple[Columns, tuple[str, ...]]:
     """Return the parameters of the sets for a case, and the keys that the case fixes."""
     model, result = case.model, dict(sets)
 
@@ -167,7 +164,7 @@ def _samples(case: Case, sets: Columns, unknowns: tuple[Unknown, ...]) -> Column
     return result
 
 
-def _criteria(case: Case, columns: Columns, *, progress: bool) -> Values:
+def _criteria(case: Case, columns: Columns, *, progress: bool) -> Array:
     """Return the criteria of drops, shape (n, n_criterion); NaN: no result.
 
     Raise InputError if the first drop, or too many of them, have none.
@@ -191,7 +188,7 @@ def _criteria(case: Case, columns: Columns, *, progress: bool) -> Values:
 
 
 def _verdict(
-    case: Case, columns: Columns, values: Values, fixed: tuple[str, ...], notes: tuple[Note, ...]
+    case: Case, columns: Columns, values: Array, fixed: tuple[str, ...], notes: tuple[Note, ...]
 ) -> Verdict:
     """Return the verdict by the criteria of drops, of which the first is that of the case."""
     octaves, (time, restitution, peaks, mass, height) = np.split(values[0], [5])
@@ -216,7 +213,7 @@ def _verdict(
     )
 
 
-def _main_unknown(columns: Columns, values: Values) -> str:
+def _main_unknown(columns: Columns, values: Array) -> str:
     """Return the unknown with the largest rank correlation; empty if the values do not vary."""
     if np.ptp(values) <= _ROUNDING * np.abs(values).max():
         return ""

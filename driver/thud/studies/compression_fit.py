@@ -28,11 +28,11 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from matplotlib.figure import Figure
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
     from thud.base._schema import CompressionGas, ModelName, ModelOptions
+    from thud.studies.arrays import Array
 
-    Array = NDArray[np.float64]
 
 # Number of points of a curve of the model, which is interpolated.
 _POINTS = 81

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from thud.studies.study import Columns, Study
+    from thud.studies.arrays import Columns
+    from thud.studies.study import Study
 
 
 def new_dataset(

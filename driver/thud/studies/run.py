@@ -34,7 +34,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from thud.case.case import Case
-    from thud.studies.study import Columns, Source, Study
+    from thud.studies.arrays import Columns
+    from thud.studies.study import Source, Study
     from thud.studies.study_result import SampleResult
     from thud.studies.trained_surrogate import Surrogate
 

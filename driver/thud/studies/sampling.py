@@ -16,8 +16,7 @@ from thud.studies.parameter import MAX_VALUES
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
-
+    from thud.studies.arrays import Array
     from thud.studies.parameter import Parameter
 
 SAMPLED = ("random", "latin_hypercube", "sobol", "saltelli")
@@ -72,7 +71,7 @@ def read_design(
 
 def unit_samples(  # noqa: PLR0913, PLR0917 - the numbers of a design
     design: str, dimension: int, size: int, seed: int, start: int, stop: int
-) -> NDArray[np.float64]:
+) -> Array:
     """Return points of a design in the unit cube, shape (stop - start, dimension)."""
     if design == "random":
         generator = np.random.PCG64(seed).advance(start * dimension)
@@ -81,7 +80,7 @@ def unit_samples(  # noqa: PLR0913, PLR0917 - the numbers of a design
 
 
 @lru_cache(maxsize=1)
-def _all_points(design: str, dimension: int, size: int, seed: int) -> NDArray[np.float64]:
+def _all_points(design: str, dimension: int, size: int, seed: int) -> Array:
     """Return all points of a design that is not sampled block by block."""
     try:
         if design == "saltelli":

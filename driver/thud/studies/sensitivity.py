@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
     import pandas as pd
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
+    from thud.studies.arrays import Array
     from thud.studies.run import RunOptions
     from thud.studies.study import Source
 
@@ -169,9 +169,7 @@ def _indices(dataset: xr.Dataset) -> tuple[xr.Dataset, int]:
     return xr.Dataset(variables, coordinates, dataset.attrs), int((~usable).sum())
 
 
-def sobol_indices(
-    values: NDArray[np.float64], dimension: int, seed: int = 0
-) -> tuple[NDArray[np.float64], ...]:
+def sobol_indices(values: Array, dimension: int, seed: int = 0) -> tuple[Array, ...]:
     """Return first-order and total Sobol indices of a quantity, with half widths of intervals.
 
     `values`, shape (n (dimension + 2),), belong to the points of a ``"saltelli"`` design; `seed` is

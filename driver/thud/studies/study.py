@@ -36,12 +36,10 @@ from thud.studies.trained_surrogate import get_surrogate, stated_surrogate
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
-    from numpy.typing import NDArray
-
+    from thud.studies.arrays import Columns
     from thud.studies.temperature import Temperature
     from thud.studies.trained_surrogate import Surrogate
 
-    Columns = dict[str, NDArray[Any]]
 
 # Types that a study is read from.
 Source: TypeAlias = "str | os.PathLike[str] | Mapping[str, object] | Study"

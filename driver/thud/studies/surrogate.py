@@ -44,8 +44,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.case.case import Case
+    from thud.studies.arrays import Array
 
-    Values = NDArray[np.float64]
 
 # Fewer drops have no order statistic that bounds 95 % of all with a confidence of 95 %.
 MIN_DROPS = 64
@@ -240,17 +240,17 @@ def extend(
     return dataclasses.replace(result, **regress(points, drops, result.assessed))
 
 
-def _decibels(name: str, values: Values) -> Values:
+def _decibels(name: str, values: Array) -> Array:
     """Return a quantity in dB, shape (n, count); NaN if any value has no logarithm."""
     if name in LEVELS:
         return values
     if (values <= 0).any():
         values = np.full_like(values, np.nan)
-    result: Values = 20 * np.log10(values)[:, np.newaxis]
+    result: Array = 20 * np.log10(values)[:, np.newaxis]
     return result
 
 
-def regress(points: Values, values: Values, assessed: NDArray[np.bool_]) -> dict[str, Any]:
+def regress(points: Array, values: Array, assessed: NDArray[np.bool_]) -> dict[str, Any]:
     """Return a Gaussian process through values at points in the unit cube.
 
     Correlation lengths and noise (of time steps, and of nodes that touch one by one) maximize the

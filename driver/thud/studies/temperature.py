@@ -14,9 +14,8 @@ from thud.case.keys import TEMPERATURE
 from thud.studies.parameter import read_value
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from thud.case.case import Case
+    from thud.studies.arrays import Array
     from thud.studies.parameter import Parameter
 
 # Keys of the damping law, and the orders of laws other than the fractional one.
@@ -52,7 +51,7 @@ class Temperature:
         """Keys that depend on the temperature."""
         return ("youngs_modulus", "loss_factor") if self.c1 else ("youngs_modulus",)
 
-    def shift(self, temperature: NDArray[np.float64]) -> NDArray[np.float64]:
+    def shift(self, temperature: Array) -> Array:
         """Return the factor a of the frequency; NaN where c2 + T - reference <= 0."""
         above = np.asarray(temperature, dtype=float) - self.reference
         with np.errstate(all="ignore"):

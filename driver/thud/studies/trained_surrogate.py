@@ -34,15 +34,14 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.base._schema import LimitsSource
+    from thud.studies.arrays import Array, Columns
 
-    Columns = dict[str, NDArray[Any]]
-    Values = NDArray[np.float64]
 
 # Fraction of held-out drops within the stated error, and the confidence of that statement.
 COVERAGE = 0.95
 # Samples that are predicted together: their kernel stays in the cache.
 _CHUNK_SIZE = 250
-# Values this fraction of the width outside the region are rounding errors.
+# Array this fraction of the width outside the region are rounding errors.
 _ROUNDING = 1e-9
 # Smoothness of the Matern kernel: functions that are twice differentiable (see `matern`).
 SMOOTHNESS = 2.5
@@ -89,17 +88,17 @@ class Surrogate(Displayed):
 
     case: Case
     keys: tuple[str, ...]
-    region: Values
+    region: Array
     outputs: dict[str, int]
     bound: float
     peaks: int
     seed: int
     version: str
-    points: Values
-    drops: Values
-    length: Values
-    weights: Values
-    residuals: Values
+    points: Array
+    drops: Array
+    length: Array
+    weights: Array
+    residuals: Array
 
     def __repr__(self) -> str:
         """Return the keys and the largest error of an assessed number."""
@@ -173,9 +172,9 @@ class Surrogate(Displayed):
         return np.repeat([name in names for name in self.outputs], list(self.outputs.values()))
 
     @property
-    def errors(self) -> Values:
+    def errors(self) -> Array:
         """Error of each number, dB, shape (n_number,); NaN if the model has no such result."""
-        result: Values = np.sort(np.abs(self.residuals), axis=0)[rank(len(self.points))]
+        result: Array = np.sort(np.abs(self.residuals), axis=0)[rank(len(self.points))]
         return result
 
     @property
@@ -184,15 +183,15 @@ class Surrogate(Displayed):
         errors = np.where(self.assessed, self.errors, -np.inf)
         return self.labels[int(np.nanargmax(errors))], float(np.nanmax(errors))
 
-    def error_of(self, name: str) -> Values:
+    def error_of(self, name: str) -> Array:
         """Return the errors of a quantity, dB, shape (count,)."""
         return self._split(self.errors)[name]
 
-    def mean_square(self, name: str) -> Values:
+    def mean_square(self, name: str) -> Array:
         """Return the mean squares of the held-out errors of a quantity, dB2, shape (count,)."""
         return self._split(np.mean(self.residuals**2, axis=0))[name]
 
-    def _split(self, numbers: Values) -> dict[str, Values]:
+    def _split(self, numbers: Array) -> dict[str, Array]:
         """Return numbers, shape (..., n_number), by quantity, shape (..., count)."""
         ends = np.cumsum(list(self.outputs.values()))[:-1]
         return dict(zip(self.outputs, np.split(numbers, ends, axis=-1), strict=True))
@@ -296,11 +295,11 @@ class Surrogate(Displayed):
         replace_file(path, self.to_bytes())
 
 
-def matern(points: Values, drops: Values) -> Values:
+def matern(points: Array, drops: Array) -> Array:
     """Return the Matern kernel of smoothness 5/2 of scaled points and drops, shape (n, n_drop)."""
     # scikit-learn is slow to import, and needed for the training only.
     distance = math.sqrt(5) * cdist(points, drops)
-    result: Values = (1 + distance + distance**2 / 3) * np.exp(-distance)
+    result: Array = (1 + distance + distance**2 / 3) * np.exp(-distance)
     return result
 
 
@@ -316,7 +315,7 @@ def rank(count: int) -> int:
     return int(np.searchsorted(np.cumsum(np.exp(logarithms)), COVERAGE))
 
 
-def assess_many(values: Values, errors: Values, source: LimitsSource) -> dict[str, NDArray[Any]]:
+def assess_many(values: Array, errors: Array, source: LimitsSource) -> dict[str, NDArray[Any]]:
     """Return margin and verdict of many drops, and whether errors could change the verdict.
 
     The columns of values are octave levels, dB; contact time, s; restitution; number of peaks;

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
 
     import xarray as xr
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
     from thud.base._schema import LimitsSource
+    from thud.studies.arrays import Array
     from thud.studies.run import RunOptions
     from thud.studies.study import Source, Study
 
@@ -66,7 +66,7 @@ class Uncertainty(SampleResult):
         return self.dataset.isel(sample=np.flatnonzero(self.dataset["status"] == 0))
 
     @property
-    def levels(self) -> NDArray[np.float64]:
+    def levels(self) -> Array:
         """Octave levels of the assessed force of these samples, dB, shape (n_sample, 5)."""
         return np.asarray(self.samples[f"{self.dataset.attrs['assessed_force']}_octave"])
 
@@ -143,7 +143,7 @@ class Uncertainty(SampleResult):
         return draw_uncertainty(self)
 
 
-def _spread(values: NDArray[np.float64]) -> tuple[str, str, str]:
+def _spread(values: Array) -> tuple[str, str, str]:
     """Return mean, standard deviation and the range of 95 % as text."""
     low, high = np.quantile(values, [0.025, 0.975])
     return f"{values.mean():.2f}", f"{values.std(ddof=1):.2f}", f"{low:.2f} to {high:.2f}"

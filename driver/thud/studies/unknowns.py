@@ -15,9 +15,8 @@ from thud.base.units import display_unit
 from thud.case.case import impact_only
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from thud.case.case import Case
+    from thud.studies.arrays import Array
 
 # Minimum and maximum order of the damping laws of rubber; 1: Kelvin–Voigt.
 ORDER_RANGE = (0.2, 1.0)
@@ -56,7 +55,7 @@ class Unknown:
         low, high = self.low / size, self.high / size
         return Note("unknown_range", self.key, math.nan, low, high, unit, {"reason": self.reason})
 
-    def quantiles(self, fraction: NDArray[np.float64], value: float) -> NDArray[np.float64]:
+    def quantiles(self, fraction: Array, value: float) -> Array:
         """Return the values below which fractions of all values lie; `value` is of the case."""
         if not 0 < self.standard_deviation < _MAX_RATIO * (self.high - self.low):
             return self.low + fraction * (self.high - self.low)
@@ -65,9 +64,7 @@ class Unknown:
 
         ends = (np.array([self.low, self.high]) - value) / self.standard_deviation
         low, high = ndtr(ends)
-        result: NDArray[np.float64] = value + self.standard_deviation * ndtri(
-            low + fraction * (high - low)
-        )
+        result: Array = value + self.standard_deviation * ndtri(low + fraction * (high - low))
         return np.clip(result, self.low, self.high)
 
 

@@ -14,11 +14,9 @@ from thud.base.immutable import Immutable
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
     from thud.impact.impact import Impact
+    from thud.studies.arrays import Array
 
-    Array = NDArray[np.float64]
 
 # Relative step of the central differences. Forces are smooth to 1e-13, but have kinks where an
 # instant enters or leaves the contact: steps of 1e-3 would cross these, steps of 1e-5 rarely do.

@@ -23,11 +23,9 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
     from thud.base.note import Note
-
-    Array = NDArray[np.float64]
+    from thud.studies.arrays import Array
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -29,12 +29,10 @@ from thud.studies.fitting.search import Objective, find_best, require_data
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from thud.studies.arrays import Array
     from thud.studies.fitting.ranges import Range
     from thud.studies.fitting.search import Effects, Term
 
-    Array = NDArray[np.float64]
 
 # A parameter closer to a limit than this, relative, lies at it.
 AT_LIMIT = 1e-4

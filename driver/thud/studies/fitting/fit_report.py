@@ -16,8 +16,7 @@ from thud.studies.fitting.force_target import ForceComparison
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from thud.studies.arrays import Array
     from thud.studies.compression_fit import CompressionFit
     from thud.studies.fitting.estimates import Estimates
     from thud.studies.fitting.fit_result import Fit, FittedTarget
@@ -174,7 +173,7 @@ def _json(content: Mapping[str, object]) -> bytes:
     return f"{json.dumps(content, indent=2, allow_nan=False, default=str)}\n".encode()
 
 
-def _csv(columns: Mapping[str, Sequence[object] | NDArray[np.float64]]) -> bytes:
+def _csv(columns: Mapping[str, Sequence[object] | Array]) -> bytes:
     return csv_text([columns, *zip(*columns.values(), strict=True)]).encode()
 
 

@@ -13,13 +13,12 @@ from thud.studies.fitting.force_target import SHIFT, ForceComparison
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    import numpy as np
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
     from thud.base.note import Note
     from thud.case.case import Case
     from thud.impact.impact import Impact
+    from thud.studies.arrays import Array
     from thud.studies.fitting.comparison import Comparison
 
 
@@ -42,7 +41,7 @@ class FittedTarget(Immutable):
     case: Case
     impact: Impact
     comparison: Comparison
-    own: NDArray[np.float64]
+    own: Array
 
     @property
     def nuisances(self) -> dict[str, tuple[float, float]]:
@@ -51,7 +50,7 @@ class FittedTarget(Immutable):
             return {}
         return self.comparison.nuisances(self.impact, self.own)
 
-    def columns(self) -> Mapping[str, Sequence[object] | NDArray[np.float64]]:
+    def columns(self) -> Mapping[str, Sequence[object] | Array]:
         """Return target and model side by side, SI units, dB: columns by their names."""
         return self.comparison.columns(self.impact, self.own)
 
@@ -86,7 +85,7 @@ class Fit(Estimates):
     """
 
     known_noise: bool
-    singular_values: NDArray[np.float64]
+    singular_values: Array
     evaluations: int
     failures: int
     converged: bool
@@ -138,7 +137,7 @@ class Fit(Estimates):
         values = ", ".join(f"{name} {value:.4g} {unit}".strip() for name, value, unit in shown)
         return f"<Fit, {'' if self.converged else 'not '}converged: {values}>"
 
-    def columns(self) -> Mapping[str, Sequence[object] | NDArray[np.float64]]:
+    def columns(self) -> Mapping[str, Sequence[object] | Array]:
         """Return the first target and the model side by side; `targets` have the others."""
         return self.targets[0].columns()
 

@@ -10,9 +10,8 @@ from thud.base.checks import refuse
 from thud.recordings.formats import MIN_SAMPLES, uniform_grid
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from thud.recordings.table import Table
+    from thud.studies.arrays import Array
 
 # Maximum force, N: its square is finite.
 MAX_FORCE = 1e12
@@ -21,12 +20,12 @@ MAX_FORCE = 1e12
 class Record(NamedTuple):
     """Uniformly spaced times, s, and force, N, both of shape (n_sample,), and sample rate, Hz."""
 
-    time: NDArray[np.float64]
-    force: NDArray[np.float64]
+    time: Array
+    force: Array
     sample_rate: float
 
 
-def time_and_force(table: Table) -> NDArray[np.float64]:
+def time_and_force(table: Table) -> Array:
     """Return time, s, and force, N, shape (n_row, 2), of a table of two columns."""
     columns = table.columns
     if len(columns) != 2:  # noqa: PLR2004 - time and force
@@ -37,7 +36,7 @@ def time_and_force(table: Table) -> NDArray[np.float64]:
     return np.column_stack([time.to("s"), force.to("N")])
 
 
-def read_record(table: NDArray[np.float64], name: str = "record") -> Record:
+def read_record(table: Array, name: str = "record") -> Record:
     """Return the record of a table with the columns time, s, and force, N.
 
     Raise InputError if it has fewer than eight samples, times that are not uniformly spaced, or

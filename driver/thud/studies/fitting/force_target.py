@@ -41,8 +41,8 @@ if TYPE_CHECKING:
 
     from thud.base._schema import LevelsForce
     from thud.recordings.background import Background
+    from thud.studies.arrays import Array
 
-    Array = NDArray[np.float64]
 
 # A record must hold the whole pulse: maximum mean of its last millisecond over its peak.
 OPEN_END = 0.1

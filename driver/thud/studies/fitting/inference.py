@@ -14,9 +14,8 @@ from thud.base.note import Note
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
+    from thud.studies.arrays import Array
 
-    Array = NDArray[np.float64]
 
 # Columns of the Jacobian with a smaller norm over that of the target, or a larger relative error,
 # are zero.

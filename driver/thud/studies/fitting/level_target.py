@@ -21,12 +21,9 @@ CONTACT_STEP = 5e-2
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
     from thud.base._schema import BandSet, LevelsForce
     from thud.impact.impact import Impact
-
-    Array = NDArray[np.float64]
+    from thud.studies.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

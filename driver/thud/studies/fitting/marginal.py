@@ -10,9 +10,8 @@ import numpy as np
 from thud.studies.fitting.inference import posterior
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from thud.studies.arrays import Array
 
-    Array = NDArray[np.float64]
 
 # Correlations of neighbors over which estimates are averaged, and the number of standard
 # deviations of the noise for each.

@@ -27,11 +27,9 @@ from thud.studies.fitting.residual_tests import UNLIKELY
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from thud.recordings.background import Cells
+    from thud.studies.arrays import Array
 
-    Array = NDArray[np.float64]
 
 # Minimum number of independent values in the band that determine the noise.
 MIN_BACKGROUND = 50

@@ -13,7 +13,8 @@ from thud.base.note import Note
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    Array = NDArray[np.float64]
+    from thud.studies.arrays import Array
+
 
 # Probability of a false warning by one test.
 UNLIKELY = 1e-3

@@ -20,15 +20,14 @@ from thud.studies.sampling import unit_samples
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
 
-    from numpy.typing import NDArray
     from tqdm import tqdm
 
     from thud.case.case import Case
     from thud.impact.impact import Impact
+    from thud.studies.arrays import Array
     from thud.studies.fitting.comparison import Comparison
     from thud.studies.fitting.ranges import Range
 
-    Array = NDArray[np.float64]
 
 # Relative steps and gains at which the search ends.
 TOLERANCE = 1e-8
