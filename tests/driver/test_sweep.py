@@ -366,10 +366,6 @@ def test_many_samples_need_a_word(tmp_path: Path) -> None:
         ("", naming("[parameters]")),
         ("[parameters]\n[parameters]", naming("TOML")),
         ("sets = 3", naming("'sets'", "name", "case")),
-        (f"{'12' * 50} = 3", naming("100 characters", "name", "case")),
-        # With its quotes 80 characters.
-        (f"{'12' * 39} = 3", naming(repr("12" * 39), "name", "case")),
-        (f"{'12' * 39}1 = 3", naming("79 characters", "name", "case")),
         (
             "parameters.temperature.values = [19]\ntemperature.c1 = 8\ntemperature.c2 = 120",
             naming("[temperature]", "reference", "coefficient"),
@@ -416,10 +412,6 @@ def test_many_samples_need_a_word(tmp_path: Path) -> None:
         ("parameters.damping_law = {low=1, high=2}", naming("damping_law", "values")),
         ("parameters.bands.values = ['third']", naming("bands", "[fixed]")),
         ("fixed.mass = -2\nparameters.height.values = [1]", naming("&ball: mass", -2.0)),
-        (
-            "fixed.wall_thickness = 0.1\nparameters.height.values = [1]",
-            naming("[fixed]", "&ball: wall_thickness", 0.1, "0.089 m"),
-        ),
         ("base = 'a.nml'\nparameters.height.values = [1]", naming("'base'", "'case'")),
         ("parameters.height = {lower=1, upper=2}", naming("height", "'lower'", "'low'")),
         ("parameters.height = {start=1}", naming("height", "'start'", "values", "low")),
@@ -498,7 +490,8 @@ def test_numbers_of_numpy_are_numbers() -> None:
 @pytest.mark.parametrize(
     ("study", "words"),
     [
-        ({"fixed": {"mass": np.ones((9, 9))}}, naming("mass", "list")),
+        ({"fixed": {"mass": np.ones((9, 9))}}, naming("mass", "numbers")),
+        ({"fixed": {"wall_thickness": 0.1}}, naming(2, "&ball: wall_thickness", 0.1, "0.089 m")),
         ({"fixed": {"mass": {1, 2}}}, naming("set", "tables")),
         ({"fixed": {"mass": 10**5000}}, naming("tables")),
     ],
@@ -559,15 +552,6 @@ def test_command_writes_figure_and_table(
     assert "Results: outputs/sweep" in printed.out
 
 
-def test_study_without_results_is_a_failure(tmp_path: Path, errors_of: ErrorsOf) -> None:
-    path = tmp_path / "high.toml"
-    path.write_text("fixed.model = 'hollow_sphere'\nparameters.height.values = [1000, 2000]")
-    assert re.search(
-        naming(2, "&drop: height", "1000.0 m"),
-        errors_of("sweep", "-q", path, "-o", tmp_path, code=2),
-    )
-
-
 def test_study_of_another_kind_is_reported() -> None:
     study = thud.read_study(HEIGHTS)
     for function in (thud.sensitivity, thud.design, thud.uncertainty):
@@ -584,11 +568,9 @@ def test_missing_packages_are_reported(tmp_path: Path) -> None:
 
 
 def test_fixed_values_may_suit_parameters_only() -> None:
-    # Neither ball exists with the other measure of the case.
-    thin = {"fixed": {"outer_radius": 0.02}, "parameters": {"wall_thickness": {"values": [0.005]}}}
+    # The ball does not exist with the radius of the case.
     thick = {"fixed": {"wall_thickness": 0.1}, "parameters": {"outer_radius": {"values": [0.2]}}}
-    for study in (thin, thick):
-        assert (thud.sweep(study).dataset["status"] != thud.InputError.exit_code).all()
+    assert (thud.sweep(thick).dataset["status"] == 0).all()
 
 
 def test_unknown_keywords_are_reported() -> None:

@@ -56,13 +56,13 @@ def run_study(options: argparse.Namespace) -> int:
             )  # fmt: skip
     except ThudError as error:
         raise error.within(options.study) from error
-    if computed.succeeded and not options.no_figures:
+    if figures:
         with warn_if_not_drawn("the figure of the study"):
             from thud.plot.save_figures import figure_files
 
             for name, content in figure_files({study.name: computed.plot()}).items():
                 replace_file(folder / name, content)
-    return _print(options, computed, folder, succeeded=computed.succeeded)
+    return _print(options, computed, folder, succeeded=True)
 
 
 def _print(

@@ -14,7 +14,7 @@ from tqdm import tqdm
 
 from thud.base.bridge import api, version
 from thud.base.checks import refuse, refuse_unknown, require_whole, shown
-from thud.base.errors import NumericalError, ThudError
+from thud.base.errors import InputError, NumericalError, ThudError
 from thud.base.extras import require_extra
 from thud.base.files import replace_file
 from thud.impact.ensemble import MAX_THREADS, solve_many
@@ -87,7 +87,10 @@ def compute(
     others: Iterable[str] = (),
     **options: Unpack[RunOptions],
 ) -> R:
-    """Return the result of a study, also written to a directory; see `thud.sweep` and `run`."""
+    """Return the result of a study, also written to a directory; see `thud.sweep` and `run`.
+
+    Raises InputError, with the first reason, if no sample has a result.
+    """
     refuse_unknown("keywords", options, RunOptions.__annotations__)
     study = read_study(source, result.kind, options.get("case"))
     if (surrogate := options.get("surrogate")) is not None:
@@ -95,7 +98,12 @@ def compute(
     result.check(study)
     tables = [f"{study.name}{result.table_ending}"] if result.table_ending else []
     try:
-        computed = result(run(study, output, (*others, *tables), **options))
+        dataset = run(study, output, (*others, *tables), **options)
+        if dataset["status"].all():
+            reason = dataset["reason"].to_numpy().flat[0]
+            message = f"none of {study.count} samples has a result: {reason}"
+            raise InputError(message)
+        computed = result(dataset)
     except MemoryError as error:
         refuse(f"{study.count} samples do not fit in memory", "fewer samples", error)
     if output is not None:
@@ -229,30 +237,24 @@ def _compute(
             if not running:
                 return
             done, _ = wait(running, return_when=FIRST_COMPLETED)
-            for future in sorted(done, key=_is_lost):
-                yield running.pop(future), _result(future)
+            # Blocks that the executor has lost are the last.
+            for future in sorted(done, key=lambda f: f.cancelled() or f.exception() is not None):
+                start = running.pop(future)
+                try:
+                    result = future.result()
+                except ThudError:
+                    raise
+                except Exception as error:
+                    reason = f"{type(error).__name__}: {error}".partition("\n")[0]
+                    message = (
+                        f"the executor lost a block of samples ({reason.removesuffix(': ')}); "
+                        "finished samples are kept; allowed: run the study again"
+                    )
+                    raise NumericalError(message) from error
+                yield start, result
     finally:
         for future in running:
             future.cancel()
-
-
-def _is_lost(future: Future[Columns]) -> bool:
-    return future.cancelled() or future.exception() is not None
-
-
-def _result(future: Future[Columns]) -> Columns:
-    """Return the results of a block; raise NumericalError if the executor has lost it."""
-    try:
-        return future.result()
-    except ThudError:
-        raise
-    except Exception as error:
-        reason = f"{type(error).__name__}: {error}".partition("\n")[0].removesuffix(": ")
-        message = (
-            f"the executor lost a block of samples ({reason}); finished samples are kept; "
-            "allowed: run the study again"
-        )
-        raise NumericalError(message) from error
 
 
 def evaluate(

@@ -71,11 +71,6 @@ class SampleResult(Displayed):
     def plot(self) -> Figure:
         """Return the figure of the result."""
 
-    @property
-    def succeeded(self) -> bool:
-        """Whether any sample has results."""
-        return bool((self.dataset["status"] == 0).any())
-
     def to_xarray(self) -> xr.Dataset:
         """Return every sample, with units and provenance."""
         return self.dataset.copy()
