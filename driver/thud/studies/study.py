@@ -31,14 +31,13 @@ from thud.studies.kinds import KINDS
 from thud.studies.parameter import Parameter, read_quantity, read_value, read_varied
 from thud.studies.sampling import read_design, sampler_versions, unit_samples
 from thud.studies.temperature import read_temperature
-from thud.studies.trained_surrogate import get_surrogate, stated_surrogate
+from thud.studies.trained_surrogate import Surrogate, read_surrogate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
     from thud.studies.arrays import Columns
     from thud.studies.temperature import Temperature
-    from thud.studies.trained_surrogate import Surrogate
 
 
 # Types that a study is read from.
@@ -210,8 +209,12 @@ def read_study(source: Source, kind: str = "sweep", case: Case | None = None) ->
             law = read_temperature(content.get("temperature"), study.case, study.parameters)
             study = replace(study, temperature=law)
         if "surrogate" in content:
-            surrogate = stated_surrogate(table_of(content, "surrogate"), folder)
-            study = with_surrogate(study, surrogate)
+            table = table_of(content, "surrogate")
+            refuse_unknown("[surrogate]", table, ("file",))
+            path = table.get("file")
+            if not isinstance(path, str) or not path.strip():
+                refuse_value("[surrogate] file", path, "the path of a trained surrogate")
+            study = with_surrogate(study, read_surrogate(folder / path))
         return study
 
 
@@ -227,7 +230,11 @@ def read_tables(
                 for name, entry in source.items()
             }
             source = {"parameters": entries}
-        text = _text(source)
+        try:
+            text = json.dumps(source, default=_plain)
+        except (TypeError, ValueError, RecursionError) as error:
+            cause = f"the study cannot be written as JSON ({error})"
+            refuse(cause, "tables, lists, numbers and text", error)
         yield {"name": "python", **json.loads(text)}, Path(), text
         return
     require_kind("study", source, str | Path)
@@ -237,18 +244,6 @@ def read_tables(
         yield {"name": path.stem, **content}, path.parent, text
     except InputError as error:
         raise error.within(path) from error
-
-
-def _text(source: Mapping[str, object]) -> str:
-    """Return tables as JSON."""
-    try:
-        return json.dumps(source, default=_plain)
-    except (TypeError, ValueError, RecursionError) as error:
-        refuse(
-            f"the study cannot be written as JSON ({error})",
-            "tables, lists, numbers and text",
-            error,
-        )
 
 
 def _plain(value: object) -> object:
@@ -289,7 +284,15 @@ def read_common(  # noqa: PLR0913, PLR0917 - tables, their names, and how parame
     if not parameters:
         refuse("[parameters] is empty", "one parameter or more")
     varied = tuple(new_parameter(name, entry, case, density) for name, entry in parameters.items())
-    _require_use(fixed, parameters)
+    if {"mass", DENSITY.name} <= {*fixed, *parameters}:
+        refuse("mass and density are both given", "one of them")
+    for name in fixed:
+        # A fixed value may be the mean of a normal distribution.
+        if name in parameters and ("std" not in parameters[name] or "mean" in parameters[name]):
+            refuse(
+                f"[fixed] {name} has no effect because of [parameters] {name}",
+                "one of them, or std without mean in [parameters]",
+            )
     return Study(content["name"].rstrip(), kind, case, varied, density)
 
 
@@ -350,19 +353,6 @@ def _read_parameter(name: str, entry: object, case: Case, density: float | None)
     return read_varied(name, entry, case, mean)
 
 
-def _require_use(fixed: Mapping[str, Any], parameters: Mapping[str, Any]) -> None:
-    """Raise InputError if one key overrides another."""
-    if {"mass", DENSITY.name} <= {*fixed, *parameters}:
-        refuse("mass and density are both given", "one of them")
-    for name in fixed:
-        # A fixed value may be the mean of a normal distribution.
-        if name in parameters and ("std" not in parameters[name] or "mean" in parameters[name]):
-            refuse(
-                f"[fixed] {name} has no effect because of [parameters] {name}",
-                "one of them, or std without mean in [parameters]",
-            )
-
-
 def _without_files(case: Case) -> Case:
     """Return a case of an impact alone, which writes no snapshots."""
     case = impact_only(case)
@@ -376,7 +366,7 @@ def with_surrogate(study: Study, surrogate: Surrogate | str | os.PathLike[str]) 
     """Return a study whose samples a surrogate predicts; raise InputError if it cannot."""
     if study.case.floor:
         refuse("[surrogate] is not allowed with a floor", "a case without &floor")
-    trained = get_surrogate(surrogate)
+    trained = surrogate if isinstance(surrogate, Surrogate) else read_surrogate(surrogate)
     trained.require(study.case, study.key_columns(study.parameter_columns(0, 1)))
     files = (surrogate,) if isinstance(surrogate, str | os.PathLike) else ()
     return replace(study, surrogate=trained, inputs=(*study.inputs, *files))

@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 
 from thud.base._schema import LIMITS
 from thud.base.bridge import version
-from thud.base.checks import refuse, refuse_unknown, refuse_value, require_kind
+from thud.base.checks import refuse, require_kind
 from thud.base.display import Displayed
 from thud.base.extras import data_frame
 from thud.base.files import is_failure, read_input, replace_file
@@ -26,7 +26,7 @@ from thud.impact.datasets import FREQUENCIES, LEVELS, RESULTS
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable
 
     import pandas as pd
     import xarray as xr
@@ -345,20 +345,6 @@ def differing_keys(before: Case, now: Case) -> list[tuple[str, str, str]]:
     )
     texts = {key: (first.get(key, "none"), second.get(key, "none")) for key in first | second}
     return [(key, *pair) for key, pair in texts.items() if pair[0] != pair[1]]
-
-
-def get_surrogate(surrogate: Surrogate | str | os.PathLike[str]) -> Surrogate:
-    """Return a surrogate, or read it from the path of its file."""
-    return surrogate if isinstance(surrogate, Surrogate) else read_surrogate(surrogate)
-
-
-def stated_surrogate(table: Mapping[str, object], folder: Path) -> Surrogate:
-    """Return the surrogate of the file that a table ``[surrogate]`` of a study names."""
-    refuse_unknown("[surrogate]", table, ("file",))
-    path = table.get("file")
-    if not isinstance(path, str) or not path.strip():
-        refuse_value("[surrogate] file", path, "the path of a trained surrogate")
-    return read_surrogate(folder / path)
 
 
 def read_surrogate(path: str | os.PathLike[str]) -> Surrogate:
