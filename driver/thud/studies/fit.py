@@ -10,20 +10,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from thud.base._schema import FiniteElement
-from thud.base.checks import MAX_SEED, refuse, refuse_value, require_kind, require_whole
+from thud.base.checks import refuse, refuse_value, require_kind
 from thud.base.errors import FitWarning, InputError, ThudError
 from thud.base.files import Results
 from thud.case.case import Case, check_case
 from thud.case.keys import with_values
 from thud.impact.compute import compute
-from thud.studies.fitting.alternatives import UNKNOWNS, require_unknowns
+from thud.studies.fitting.alternatives import UNKNOWNS
 from thud.studies.fitting.evaluation import search
 from thud.studies.fitting.fit_report import file_ends
 from thud.studies.fitting.force_target import ForceTarget
-from thud.studies.fitting.inference import require_confidence
 from thud.studies.fitting.ranges import bound_parameters, fitted_parameter, get_ranges
 from thud.studies.fitting.read_target import Target, read_target
-from thud.studies.fitting.search import Term
+from thud.studies.fitting.search import SearchOptions, Term
 from thud.studies.study import (
     fix_keys,
     named_files,
@@ -44,17 +43,6 @@ if TYPE_CHECKING:
     from thud.studies.fitting.fit_result import Fit
     from thud.studies.fitting.ranges import Range
     from thud.studies.parameter import Parameter
-
-# Options of a search, and their defaults.
-OPTIONS: dict[str, Any] = {
-    "confidence": 0.95,
-    "starts": 1,
-    "seed": 0,
-    "max_steps": 100,
-    "unknowns": UNKNOWNS,
-}
-# Maximum number of starts, and of steps of a search.
-_MAXIMUM = 100_000
 
 
 def fit(  # noqa: PLR0913 - options of a search
@@ -120,14 +108,8 @@ def fit(  # noqa: PLR0913 - options of a search
     """
     case = Case() if case is None else case
     require_kind("case", case, Case)
-    options = {
-        "confidence": confidence,
-        "starts": starts,
-        "seed": seed,
-        "max_steps": max_steps,
-        "unknowns": unknowns,
-    }
-    _require_options(options)
+    options = SearchOptions(confidence, starts, seed, max_steps, unknowns)
+    options.require()
     bound = bound_parameters(case, parameters)
     if not isinstance(target, list):
         target = [target if isinstance(target, Target) else ForceTarget(target)]
@@ -178,7 +160,7 @@ def _with_fixed(
 
 
 def _search(
-    terms: list[Term], ranges: list[Range], options: Mapping[str, Any], *, progress: bool
+    terms: list[Term], ranges: list[Range], options: SearchOptions, *, progress: bool
 ) -> Fit:
     for i, term in enumerate(terms):
         model = term.case.model
@@ -201,14 +183,6 @@ def _with_mesh(case: Case, ranges: list[Range]) -> Case:
     return with_values(case, numbers)
 
 
-def _require_options(options: Mapping[str, Any]) -> None:
-    require_confidence(options["confidence"])
-    require_whole("starts", options["starts"], 1, _MAXIMUM)
-    require_whole("max_steps", options["max_steps"], 1, _MAXIMUM)
-    require_whole("seed", options["seed"], 0, MAX_SEED)
-    require_unknowns(options["unknowns"], UNKNOWNS)
-
-
 @dataclass(frozen=True)
 class FitStudy:
     """A fit as a file describes it, complete and checked.
@@ -223,8 +197,8 @@ class FitStudy:
         The parameters that are fitted.
     terms : list of Term
         Case and comparison of each target.
-    options : dict
-        Options of the search, see `OPTIONS`.
+    options : SearchOptions
+        Options of the search.
     tables : dict
         The tables of the file.
     inputs : tuple of path-like
@@ -235,7 +209,7 @@ class FitStudy:
     case: Case
     parameters: tuple[Parameter, ...]
     terms: list[Term]
-    options: dict[str, Any]
+    options: SearchOptions
     tables: dict[str, Any]
     inputs: tuple[str | os.PathLike[str], ...]
 
@@ -254,7 +228,7 @@ def read_fit_study(source: str | os.PathLike[str] | Mapping[str, object]) -> Fit
     """
     with read_tables(source) as (content, folder, _):
         study = read_common(
-            content, folder, "fit", ("target", *OPTIONS),
+            content, folder, "fit", ("target", *SearchOptions._fields),
             lambda name, entry, case, _: fitted_parameter(name, entry, case),
         )  # fmt: skip
         case = study.case
@@ -269,8 +243,9 @@ def read_fit_study(source: str | os.PathLike[str] | Mapping[str, object]) -> Fit
         elif not tables or not all(isinstance(table, dict) for table in tables):
             refuse_value("target", tables, "a table [target], or several [[target]]")
         targets = [read_target(table, folder) for table in tables]
-        options = {name: content.get(name, default) for name, default in OPTIONS.items()}
-        _require_options(options)
+        stated = {name: content[name] for name in SearchOptions._fields if name in content}
+        options = SearchOptions(**stated)
+        options.require()
         get_ranges(case, study.parameters)
         # JSON knows neither dates nor infinity.
         shown = json.loads(json.dumps(content, default=str), parse_constant=str)

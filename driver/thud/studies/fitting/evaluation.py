@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy import stats
@@ -27,11 +27,11 @@ from thud.studies.fitting.residual_tests import UNLIKELY, size_warning
 from thud.studies.fitting.search import Objective, find_best, require_data
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Mapping, Sequence
+    from collections.abc import Collection, Sequence
 
     from thud.studies.arrays import Array
     from thud.studies.fitting.ranges import Range
-    from thud.studies.fitting.search import Effects, Term
+    from thud.studies.fitting.search import Effects, SearchOptions, Term
 
 
 # A parameter closer to a limit than this, relative, lies at it.
@@ -58,20 +58,16 @@ class _Point(NamedTuple):
 
 
 def search(
-    terms: Sequence[Term], ranges: Sequence[Range], options: Mapping[str, Any], *, progress: bool
+    terms: Sequence[Term], ranges: Sequence[Range], options: SearchOptions, *, progress: bool
 ) -> Fit:
-    """Return the best fit of the parameters of cases to their targets.
-
-    `options` are confidence, starts, seed, max_steps and unknowns of `thud.fit`.
-    """
+    """Return the best fit of the parameters of cases to their targets."""
     require_data(terms, len(ranges))
     with tqdm(unit="impact", disable=not progress, leave=False) as bar:
         objective = Objective(terms, ranges, bar)
-        best = find_best(objective, *(int(options[n]) for n in ("starts", "seed", "max_steps")))
+        best = find_best(objective, options)
         return new_fit(
-            objective, best.x, options["confidence"], options["unknowns"],
-            converged=best.status > 0,
-        )  # fmt: skip
+            objective, best.x, options.confidence, options.unknowns, converged=best.status > 0
+        )
 
 
 def new_fit(
@@ -149,7 +145,6 @@ def new_fit(
         failures=objective.failures,
         converged=converged,
         targets=targets,
-        given_units={r.name: r.given_unit for r in objective.ranges if r.given_unit},
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from thud.base.immutable import Immutable
@@ -80,8 +80,6 @@ class Fit(Estimates):
         The search has converged.
     targets : tuple of FittedTarget
         Case, impact and comparison of each target.
-    given_units : dict of str to tuple
-        Units of the parameters in the study, and their sizes in SI units.
     """
 
     known_noise: bool
@@ -90,7 +88,6 @@ class Fit(Estimates):
     failures: int
     converged: bool
     targets: tuple[FittedTarget, ...]
-    given_units: dict[str, tuple[str, float]] = field(default_factory=dict)
 
     @property
     def case(self) -> Case:
@@ -120,11 +117,6 @@ class Fit(Estimates):
         found = (note for background in backgrounds if background for note in background.notes)
         impacts = (note for target in self.targets for note in target.impact.warnings)
         return tuple(dict.fromkeys((*found, *impacts)))
-
-    @property
-    def display_units(self) -> dict[str, tuple[str, float]]:
-        """Name of the unit in tables and figures, and how many SI units it is, by parameter."""
-        return super().display_units | self.given_units
 
     def deviation_of(self, target: FittedTarget) -> float:
         """Return the standard deviation of one residual of a target, see `noise`."""

@@ -10,7 +10,6 @@ import numpy as np
 
 from thud.base._schema import KEYS
 from thud.base.checks import refuse, require_kind, suggestion
-from thud.base.units import scaled
 from thud.case.keys import limits, with_values
 from thud.studies.parameter import read_fitted
 
@@ -34,7 +33,7 @@ class Range:
     """Start and limits of a parameter of a fit, SI units.
 
     The search divides it by `scale`: its start, or a tenth of the range if that is 0. Other starts
-    lie within `spread`. `given_unit` is the unit in the study, with its size in SI units.
+    lie within `spread`.
     """
 
     name: str
@@ -44,7 +43,6 @@ class Range:
     high: float
     scale: float
     spread: tuple[float, float]
-    given_unit: tuple[str, float] | None = None
 
 
 def known_parameters(case: Case) -> dict[str, tuple[Key, float]]:
@@ -129,6 +127,4 @@ def _get_range(case: Case, parameter: Parameter, start: float) -> Range:
         low = -np.inf
     margin = min(INSIDE * scale, (high - low) / 4)
     start = min(max(start, low + margin), high - margin)
-    unit, power = parameter.shown_unit
-    given_unit = (unit, scaled(1.0, power)) if parameter.unit else None
-    return Range(name, key.unit, start, low, high, scale, spread, given_unit)
+    return Range(name, key.unit, start, low, high, scale, spread)

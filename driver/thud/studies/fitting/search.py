@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
-from thud.base.checks import refuse
+from thud.base.checks import MAX_SEED, refuse, require_whole
 from thud.base.errors import NumericalError, ThudError
 from thud.base.note import Note
 from thud.case.keys import with_values
 from thud.impact.compute import compute
-from thud.studies.fitting.alternatives import alternatives
+from thud.studies.fitting.alternatives import UNKNOWNS, alternatives, require_unknowns
 from thud.studies.fitting.force_target import ForceComparison
+from thud.studies.fitting.inference import require_confidence
 from thud.studies.sampling import unit_samples
 
 if TYPE_CHECKING:
@@ -31,6 +32,28 @@ if TYPE_CHECKING:
 
 # Relative steps and gains at which the search ends.
 TOLERANCE = 1e-8
+
+
+# Maximum number of starts, and of steps of a search.
+_MAXIMUM = 100_000
+
+
+class SearchOptions(NamedTuple):
+    """Options of a search, see `thud.fit`."""
+
+    confidence: float = 0.95
+    starts: int = 1
+    seed: int = 0
+    max_steps: int = 100
+    unknowns: Sequence[str] = UNKNOWNS
+
+    def require(self) -> None:
+        """Raise InputError if an option is not allowed."""
+        require_confidence(self.confidence)
+        require_whole("starts", self.starts, 1, _MAXIMUM)
+        require_whole("max_steps", self.max_steps, 1, _MAXIMUM)
+        require_whole("seed", self.seed, 0, MAX_SEED)
+        require_unknowns(self.unknowns, UNKNOWNS)
 
 
 class Term(NamedTuple):
@@ -204,16 +227,16 @@ def require_data(terms: Sequence[Term], count: int) -> None:
         )
 
 
-def find_best(objective: Objective, starts: int, seed: int, max_steps: int) -> OptimizeResult:
+def find_best(objective: Objective, options: SearchOptions) -> OptimizeResult:
     """Return the best of the least-squares solutions from all starts.
 
     Raises the error of the first start if there is none.
     """
     best: OptimizeResult | None = None
     failures: list[ThudError] = []
-    for start in starts_of(objective.ranges, starts, seed):
+    for start in starts_of(objective.ranges, int(options.starts), int(options.seed)):
         try:
-            result = _minimize(objective, start, max_steps)
+            result = _minimize(objective, start, int(options.max_steps))
         except ThudError as error:
             failures.append(error)
             continue
