@@ -137,7 +137,7 @@ def test_time_of_first_touch_is_found_between_samples() -> None:
     whole = np.concatenate([impact.floor_force, np.zeros(3000 - len(impact.time))])
     moved = np.fft.irfft(np.fft.rfft(whole) * np.exp(-2j * np.pi * frequency * late), 3000)
     fit = thud.fit((time, moved), ["youngs_modulus"], case=SHELL)
-    assert fit.time_shift == pytest.approx(late, abs=1e-10)
+    assert fit.values["time_shift"] == pytest.approx(late, abs=1e-10)
     assert fit.values["youngs_modulus"] == pytest.approx(1.8e6, rel=SOLVED)
 
 

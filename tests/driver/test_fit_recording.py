@@ -81,7 +81,7 @@ def test_finite_elements_find_modulus_and_loss_of_a_recording(
         # The record excludes the start.
         assert abs(found.values[name] - start) > FAR * found.standard_errors[name]
     # First touch at 0.2 s of the file.
-    touch = record[0].drops[0].onset + found.time_shift
+    touch = record[0].drops[0].onset + found.values["time_shift"]
     assert abs(touch - 0.2) < FAR * found.standard_errors["time_shift"] + 0.5 / 44100
     assert found.known_noise
     assert not found.warnings

@@ -77,7 +77,7 @@ def test_units_are_those_of_the_file() -> None:
     assert [p.table for p in study.parameters] == [{"start": 1.4e6, "unit": "MPa"}]
     fit = run_fit(study)
     # The table of the record has times of its own.
-    assert fit.time_shift == pytest.approx(0.2, abs=1e-6)
+    assert fit.values["time_shift"] == pytest.approx(0.2, abs=1e-6)
     assert fit.values["youngs_modulus"] == pytest.approx(1.56e6, rel=1e-6)
     assert "1.56" in fit.table()
 

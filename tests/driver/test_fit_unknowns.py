@@ -58,17 +58,17 @@ def test_more_effects_than_residuals_have_their_priors() -> None:
 
 def test_alternatives_differ_from_the_case_in_one_unknown() -> None:
     found = alternatives(ASSUMED, UNKNOWNS, ())
-    assert [entry.unknown for entry in found] == [
+    assert [unknown for unknown, *_ in found] == [
         *["damping law"] * len(ORDERS), "friction", "gravity", "floor"
     ]  # fmt: skip
-    assert [entry.case.model.fractional_order for entry in found[:3]] == list(ORDERS)  # type: ignore[union-attr]
-    assert found[-1].case.floor is not None
+    assert [case.model.fractional_order for *_, case in found[:3]] == list(ORDERS)  # type: ignore[union-attr]
+    assert found[-1][2].floor is not None
     # A parameter that is fitted is none of them.
     assert len(alternatives(ASSUMED, UNKNOWNS, ["fractional_order"])) == 3
-    assert [entry.unknown for entry in alternatives(ASSUMED, ["gravity"], ())] == ["gravity"]
+    assert [unknown for unknown, *_ in alternatives(ASSUMED, ["gravity"], ())] == ["gravity"]
     elastic = thud.Case(model=thud.FiniteElement(viscosity="none"))
     found = alternatives(elastic, UNKNOWNS, ())
-    assert [entry.label for entry in found] == ["friction 1.0", "resistance 100000.0"]
+    assert [label for _, label, _ in found] == ["friction 1.0", "resistance 100000.0"]
     assert not alternatives(thud.Case(model=thud.HollowSphere()), UNKNOWNS, ())
 
 

@@ -217,7 +217,7 @@ def test_rounded_times_do_not_move_the_fit() -> None:
     impact = thud.solve(duration=0.03)
     fit = thud.fit(((impact.time + 0.2).round(6), impact.floor_force), ["youngs_modulus"])
     # Of 1323 times rounded to 1 us the mean is off by 1 us / sqrt(12 * 1323); four of that.
-    assert fit.time_shift == pytest.approx(0.2, abs=4e-6 / np.sqrt(12 * 1323))
+    assert fit.values["time_shift"] == pytest.approx(0.2, abs=4e-6 / np.sqrt(12 * 1323))
 
 
 @pytest.mark.parametrize("digits", [5, 6, 7, 9, 16])

@@ -170,7 +170,8 @@ def fit_compression(  # noqa: PLR0913 - as in `compress`
     measured, measured_force = _data(deflection, force)
     require_confidence(confidence)
     require_unknowns(unknowns, PRESS_UNKNOWNS)
-    _require_gain(gain)
+    if not 0 <= require_number("gain", gain) < 1:
+        refuse_value("gain", gain, "0 <= gain < 1")
     problem = _Problem(
         case.ball, value_in(case, "youngs_modulus"), model, gas, measured, measured_force,
         tuple(unknowns), gain,
@@ -361,12 +362,6 @@ def _work_ratio(curve: CompressionCurve, measured: Array, measured_force: Array)
             "a compression by millimeters",
         )
     return max(work, 0.01 * float(measured_force[-1] * np.ptp(measured))) / model_work
-
-
-def _require_gain(gain: object) -> None:
-    require_number("gain", gain)
-    if not 0 <= gain < 1:  # type: ignore[operator]
-        refuse_value("gain", gain, "0 <= gain < 1")
 
 
 def _warnings(residual: Array, relative_touch: float) -> tuple[list[Note], float]:

@@ -198,9 +198,12 @@ def read_study(source: Source, kind: str = "sweep", case: Case | None = None) ->
     with read_tables(source) as (content, folder, text):
         study = read_common(content, folder, kind, _SAMPLE_KEYS, _read_parameter, case)
         own = () if isinstance(source, Mapping) else (source,)
+        alone = impact_only(study.case)
+        if isinstance(alone.model, FiniteElement):
+            alone = with_values(alone, {"snapshot_interval": 0.0})
         study = replace(
             study,
-            case=_without_files(study.case),
+            case=alone,
             text=text,
             inputs=(*own, *named_files(content, folder)),
             **read_design(table_of(content, "design"), KINDS[kind].designs, study.parameters),
@@ -351,15 +354,6 @@ def _read_parameter(name: str, entry: object, case: Case, density: float | None)
         refuse("[parameters] bands is not allowed", "bands in [fixed], the same for all samples")
     mean = density if name == DENSITY.name else value_in(case, name)
     return read_varied(name, entry, case, mean)
-
-
-def _without_files(case: Case) -> Case:
-    """Return a case of an impact alone, which writes no snapshots."""
-    case = impact_only(case)
-    model = case.model
-    if not isinstance(model, FiniteElement):
-        return case
-    return replace(case, model=replace(model, snapshot_interval=0.0))
 
 
 def with_surrogate(study: Study, surrogate: Surrogate | str | os.PathLike[str]) -> Study:

@@ -7,7 +7,7 @@ directions in which the model may be wrong, by about as much as the alternatives
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from thud.base._schema import FiniteElement, InfinitePlate, ModalBall
 from thud.base.checks import refuse_unknown, refuse_value, shown
@@ -23,14 +23,6 @@ if TYPE_CHECKING:
 ORDERS = (ORDER_RANGE[0], sum(ORDER_RANGE) / 2, ORDER_RANGE[1])
 # Driving-point resistance of a slab, N s/m: concrete of 75 mm. A force plate stands on more.
 RESISTANCE = 1e5
-
-
-class Alternative(NamedTuple):
-    """A case with another assumption about one of its unknowns, in words."""
-
-    unknown: str
-    label: str
-    case: Case
 
 
 def _damping_laws(name: str) -> list[dict[str, object]]:
@@ -80,13 +72,13 @@ def require_unknowns(unknowns: object, known: Collection[str]) -> None:
 
 def alternatives(
     case: Case, unknowns: Collection[str], fitted: Collection[str]
-) -> list[Alternative]:
-    """Return the alternatives to a case that its unknowns allow, if some keys are fitted."""
+) -> list[tuple[str, str, Case]]:
+    """Return unknown, label and case of each alternative to a case, if some keys are fitted."""
     known = {_FITTED[name] for name in fitted if name in _FITTED}
     rigid = replace(case, floor=None, room=None)
     on_plate = replace(rigid, floor=InfinitePlate())
     return [
-        Alternative(
+        (
             name,
             " and ".join(f"{key} {shown(value)}" for key, value in values.items()),
             with_values(on_plate if name == "floor" else rigid, values),

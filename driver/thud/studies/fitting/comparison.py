@@ -32,8 +32,6 @@ class Comparison(Immutable, ABC):
     ----------
     unit : str
         Unit of an estimated standard deviation.
-    data : ndarray
-        The numbers of the target.
     weighted_target : ndarray, shape (size,)
         The target over its standard deviation.
     known_noise : bool
@@ -51,7 +49,6 @@ class Comparison(Immutable, ABC):
     """
 
     unit: ClassVar[str]
-    data: Array
     weighted_target: Array
     known_noise: bool
     noise_freedom: int | None = None

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from thud.base.immutable import Immutable
 from thud.studies.fitting.estimates import Estimates
 from thud.studies.fitting.fit_report import fit_files, fit_table
-from thud.studies.fitting.force_target import SHIFT, ForceComparison
+from thud.studies.fitting.force_target import ForceComparison
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -104,11 +104,6 @@ class Fit(Estimates):
         """Squared residuals over degrees of freedom; 1 where the noise is estimated."""
         freedom = self.degrees_of_freedom
         return float(self.residuals @ self.residuals / freedom) if freedom else float("nan")
-
-    @property
-    def time_shift(self) -> float:
-        """Time of first touch in the first record, s."""
-        return self.values.get(SHIFT, self.values.get(f"{SHIFT}(1)", 0.0))
 
     @property
     def notes(self) -> tuple[Note, ...]:

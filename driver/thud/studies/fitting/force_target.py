@@ -382,7 +382,7 @@ def compare_force(target: ForceTarget, record: Record, pulse: tuple[int, int]) -
         )
     assessed = source.assessed_force() if isinstance(source, Impact) else "floor"
     return ForceComparison(
-        data=force, weighted_target=weighted, known_noise=known_noise,
+        weighted_target=weighted, known_noise=known_noise,
         noise_freedom=quiet.freedom if shown and target.noise is None else None,
         unit_deviation=target.noise or (weights.deviation() if known_noise else 1.0),
         absorbed=offset + 2 * len(tones), own={name: SCALES[name] for name in names},

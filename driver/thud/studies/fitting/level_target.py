@@ -90,7 +90,6 @@ class LevelTarget(Plain):
         for value in deviation.tolist():
             require_positive("uncertainty", value, "dB or SI units")
         return LevelComparison(
-            data=np.concatenate([target, deviation]),
             weighted_target=target / deviation,
             known_noise=self.uncertainty is not None,
             step=CONTACT_STEP if "contact_time" in quantities else STEP,
