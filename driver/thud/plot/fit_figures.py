@@ -26,7 +26,6 @@ from thud.studies.fitting.force_target import SHIFT, ForceComparison
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from numpy.typing import NDArray
 
     from thud.studies.fitting.fit_result import Fit, FittedTarget
     from thud.studies.fitting.level_target import LevelComparison
@@ -174,8 +173,19 @@ def _draw_pair(fit: Fit, axes: Axes, pair: tuple[int, int]) -> None:
     factor = np.array([fit.display_units[fit.names[i]][1] for i in pair])
     center = fit.estimate[list(pair)] / factor
     block = fit.covariance[np.ix_(pair, pair)] / np.outer(factor, factor)
-    square = _squared_radius(fit)
-    _add_ellipse(axes, center, square * block, f"{100 * fit.confidence:g} % region of both")
+    # Twice the quantile of F where the intervals use Student's t, else of chi-square.
+    logarithm, freedom = np.log1p(-fit.confidence), fit.interval_freedom
+    square = -2 * logarithm
+    if freedom is not None:
+        square = freedom * np.expm1(-2 * logarithm / freedom)
+    # An ellipse that is scaled by its deviations has diagonal axes: no loss of digits.
+    (x, y), angle = np.sqrt(square * np.diag(block)), np.linspace(0, 2 * np.pi, 181)
+    correlation = square * block[0, 1] / (x * y)
+    height = correlation * np.cos(angle) + np.sqrt(max(0, 1 - correlation**2)) * np.sin(angle)
+    axes.fill(
+        center[0] + x * np.cos(angle), center[1] + y * height, facecolor="none",
+        edgecolor=COLORS[0], linewidth=1.2, label=f"{100 * fit.confidence:g} % region of both",
+    )  # fmt: skip
     axes.plot(
         *center, color=COLORS[1], marker="+", markersize=6, linestyle="none", label="Estimate"
     )
@@ -199,34 +209,6 @@ def _draw_pair(fit: Fit, axes: Axes, pair: tuple[int, int]) -> None:
     correlation = fit.correlation[pair]
     digits = 2 if abs(correlation) < 0.99 else 4  # noqa: PLR2004 - 1.00 would hide a difference
     axes.set_title(f"Correlation {correlation:z.{digits}f}".replace("-", "−"))
-
-
-def _squared_radius(fit: Fit) -> float:
-    """Return twice the quantile of F where the intervals use Student's t, else of chi-square."""
-    logarithm = np.log1p(-fit.confidence)
-    freedom = fit.interval_freedom
-    if freedom is None:
-        return float(-2 * logarithm)
-    return float(freedom * np.expm1(-2 * logarithm / freedom))
-
-
-def _add_ellipse(
-    axes: Axes, center: NDArray[np.float64], block: NDArray[np.float64], label: str
-) -> None:
-    """Draw the ellipse (x - center) block^-1 (x - center) = 1."""
-    # An ellipse that is scaled by its deviations has diagonal axes: no loss of digits.
-    x, y = np.sqrt(np.diag(block))
-    angle = np.linspace(0, 2 * np.pi, 181)
-    correlation = block[0, 1] / (x * y)
-    axes.fill(
-        center[0] + x * np.cos(angle),
-        center[1]
-        + y * (correlation * np.cos(angle) + np.sqrt(max(0, 1 - correlation**2)) * np.sin(angle)),
-        facecolor="none",
-        edgecolor=COLORS[0],
-        linewidth=1.2,
-        label=label,
-    )
 
 
 def _label(name: str, unit: str, letters: float) -> str:

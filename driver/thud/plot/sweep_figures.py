@@ -59,7 +59,10 @@ def show_parameter(axes: Axes, which: Literal["x", "y"], parameter: xr.DataArray
     if unit == parameter.attrs["units"] and not _PLAIN_RANGE[0] <= maximum < _PLAIN_RANGE[1]:
         unit, size = display_unit(unit, maximum)
         factor = 1 / size
-    shown = re.sub(r"(?<=[a-z])\d", _raise_digit, unit.replace("degC", "°C"))
+    # A digit behind a unit is an exponent, as in "MN/m3".
+    shown = re.sub(
+        r"(?<=[a-z])\d", lambda match: "⁰¹²³⁴⁵⁶⁷⁸⁹"[int(match[0])], unit.replace("degC", "°C")
+    )
     label = parameter_label(parameter) if unit == "1" else f"{parameter_label(parameter)}, {shown}"
     axes.set(**{f"{which}label": label})
     axis: Axis = getattr(axes, f"{which}axis")
@@ -69,11 +72,6 @@ def show_parameter(axes: Axes, which: Literal["x", "y"], parameter: xr.DataArray
     else:
         axes.ticklabel_format(axis=which, useOffset=False)
     return factor
-
-
-def _raise_digit(match: re.Match[str]) -> str:
-    """Return a digit as an exponent: "MN/m3" has a power."""
-    return match[0].translate(str.maketrans("23456789", "²³⁴⁵⁶⁷⁸⁹"))
 
 
 def _mark_decades(axis: Axis, values: NDArray[np.float64]) -> None:
@@ -122,8 +120,12 @@ def draw_sweep(result: Sweep) -> Figure:
     name = (numeric or varied or list(columns))[0]
     texts = [n for n in varied if n not in numeric and n != name]
     panel_parameter = next((n for n in texts if len(np.unique(columns[n])) <= _MAX_PANELS), None)
-    has_room = "room_rating" in dataset
-    drawn = _get_ratings(dataset) if has_room else _get_relative_levels(dataset, columns)
+    if "room_rating" in dataset:
+        level = dataset["room_rating"].values.reshape(-1, 1)
+        label = f"{RATING_SYMBOL} in the room below,\ndB re 20 µPa"
+        drawn = _Curves(level, ["in the room"], label)
+    else:
+        drawn = _get_relative_levels(dataset, columns)
     masks = {"": np.ones(len(columns[name]), dtype=bool)}
     if panel_parameter:
         values = columns[panel_parameter]
@@ -175,12 +177,6 @@ def _get_relative_levels(dataset: xr.Dataset, columns: Columns) -> _Curves:
     names = [f"{band:g} Hz" for band in get_bands().nominal]
     label = f"Level − nominal, dB\n({force})"
     return _Curves(level, names, label, (min(tolerances), max(tolerances)))
-
-
-def _get_ratings(dataset: xr.Dataset) -> _Curves:
-    """Return the rating of the levels in the room."""
-    level = dataset["room_rating"].values.reshape(-1, 1)
-    return _Curves(level, ["in the room"], f"{RATING_SYMBOL} in the room below,\ndB re 20 µPa")
 
 
 def _draw_curves(

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from thud.studies.parameter import Parameter
     from thud.studies.run import RunOptions
     from thud.studies.study import Source, Study
 
@@ -51,11 +50,14 @@ class Design(SampleResult):
     @classmethod
     def check(cls, study: Study) -> None:
         """Raise InputError for a study of other than one or two numeric parameters."""
-        if len(study.parameters) > MAX_AXES or not all(map(_is_axis, study.parameters)):
-            refuse(
-                "[parameters] do not make a map",
-                "one or two numeric parameters of two or more values",
-            )
+        are_axes = [
+            parameter.key.kind in NUMERIC_KINDS
+            and (parameter.values is None or len(set(parameter.values)) > 1)
+            for parameter in study.parameters
+        ]
+        if len(are_axes) > MAX_AXES or not all(are_axes):
+            allowed = "one or two numeric parameters of two or more values"
+            refuse("[parameters] do not make a map", allowed)
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -165,8 +167,3 @@ def design(
     those of `sweep`.
     """
     return compute(Design, study, output, **options)
-
-
-def _is_axis(parameter: Parameter) -> bool:
-    values = parameter.values
-    return parameter.key.kind in NUMERIC_KINDS and (values is None or len(set(values)) > 1)
