@@ -11,13 +11,7 @@ import xarray as xr
 from thud.base.checks import refuse
 from thud.base.files import is_failure, read_input, replace_file
 from thud.case.case import case_text
-from thud.impact.datasets import (
-    FREQUENCIES,
-    RESULTS,
-    attributes,
-    case_attributes,
-    sample_variables,
-)
+from thud.impact.datasets import FREQUENCIES, RESULTS, attributes, case_attributes, sample_variables
 from thud.studies.sampling import sampler_versions
 
 if TYPE_CHECKING:

@@ -31,12 +31,7 @@ from thud.level.levels import peak_count
 from thud.studies.parameter import Parameter, read_varied
 from thud.studies.sampling import unit_samples
 from thud.studies.study import named_files, read_common, read_tables, table_of
-from thud.studies.trained_surrogate import (
-    SMOOTHNESS,
-    Surrogate,
-    differing_keys,
-    read_surrogate,
-)
+from thud.studies.trained_surrogate import SMOOTHNESS, Surrogate, differing_keys, read_surrogate
 
 if TYPE_CHECKING:
     import os

@@ -25,10 +25,7 @@ if TYPE_CHECKING:
 
 # What [target] may hold, and the units of its numbers.
 _FORCE_KEYS = ("file", "config", *(f.name for f in fields(ForceTarget) if f.name != "record"))
-_LEVEL_KEYS = (
-    *(f.name for f in fields(LevelTarget) if f.name != "quantities"),
-    *SAMPLE_QUANTITIES,
-)
+_LEVEL_KEYS = (*(f.name for f in fields(LevelTarget) if f.name != "quantities"), *SAMPLE_QUANTITIES)
 _UNITS = {
     "noise": "N", "below": "Hz", "window": "s", "frequencies": "Hz", "gain": "",
 }  # fmt: skip
