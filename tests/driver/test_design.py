@@ -46,22 +46,6 @@ def test_margin_of_a_source_with_known_levels() -> None:
     np.testing.assert_allclose(found["margin"], np.min(expected, axis=0), atol=1e-6)
 
 
-def test_map_holds_the_verdicts_of_single_drops() -> None:
-    result = thud.design(MODAL)
-    assert result.axes == ("wall_thickness", "youngs_modulus")
-    assert result.dataset["wall_thickness"].values.tolist() == [0.029, 0.0306, 0.032]
-    verdicts = []
-    for thickness in (0.029, 0.0306, 0.032):
-        for modulus in (1.5e6, 1.8e6, 2.0e6):
-            ball = thud.Ball(wall_thickness=thickness, youngs_modulus=modulus)
-            options = {"damping_law": "rising", "loss_factor": 0.2}
-            verdicts.append(bool(thud.solve(ball, model="modal_ball", **options).assess()))
-    assert result.dataset["conforms"].values.ravel().tolist() == verdicts
-    assert any(verdicts)
-    assert not all(verdicts)
-    assert (result.dataset["margin"].values.ravel() >= 0).tolist() == verdicts
-
-
 def test_case_is_marked() -> None:
     result = thud.design(MODAL)
     assert result.mark == (0.032, 1.56e6)

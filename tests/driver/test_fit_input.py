@@ -15,12 +15,7 @@ RECORD = IMPACT.time, IMPACT.floor_force + np.random.default_rng(1).normal(size=
 @pytest.mark.parametrize(
     ("target", "parameters", "options", "words"),
     [
-        (
-            RECORD,
-            ["hardness"],
-            {},
-            naming("[parameters]", "hardness", "outer_radius"),
-        ),
+        (RECORD, ["hardness"], {}, naming("[parameters]", "hardness", "outer_radius")),
         (RECORD, [], {}, naming("parameters", "outer_radius")),
         (RECORD, {"mass": -1.0}, {}, naming("mass", -1.0, 1e-12)),
         (RECORD, {"mass": thud.Parameter(2.0, 3.0, 1.0)}, {}, naming("mass", "low", 3, "high", 1)),
@@ -39,20 +34,10 @@ RECORD = IMPACT.time, IMPACT.floor_force + np.random.default_rng(1).normal(size=
         (RECORD, {"height": 1e5}, {}, naming("start", "&ball: youngs_modulus")),
         ((RECORD[0], RECORD[1][:-1]), ["mass"], {}, naming("target", "ForceTarget")),
         (1.0, ["mass"], {}, naming("target", "ForceTarget")),
-        (
-            tuple(c[:600] for c in RECORD),
-            ["mass"],
-            {},
-            naming("target", "record"),
-        ),
+        (tuple(c[:600] for c in RECORD), ["mass"], {}, naming("target", "record")),
         (thud.ForceTarget(RECORD, noise=0.0), ["mass"], {}, naming("noise", 0.0)),
         (thud.ForceTarget(RECORD, below=1e5), ["mass"], {}, naming("below", 100000.0)),
-        (
-            thud.ForceTarget(RECORD, window=(2, 3)),
-            ["mass"],
-            {},
-            naming("window", [2, 3], 0),
-        ),
+        (thud.ForceTarget(RECORD, window=(2, 3)), ["mass"], {}, naming("window", [2, 3], 0)),
         (thud.ForceTarget(RECORD, force="gas"), ["mass"], {}, naming("force", "'gas'", "'floor'")),
         (thud.LevelTarget([39.0] * 4), ["mass"], {}, naming("levels", 5)),
         (thud.LevelTarget([39.0] * 5, -1), ["mass"], {}, naming("uncertainty", -1.0, 0)),

@@ -137,21 +137,14 @@ def test_results_are_replaced_as_a_whole_and_others_on_demand_only(
     assert cli.main([*other, "--replace"]) == 0
 
 
-@pytest.mark.parametrize("place", ["study.toml", "/proc"])
+@pytest.mark.parametrize("place", ["study.toml", "/proc", "found"])
 def test_useless_directory_is_reported_before_the_search(
-    place: str, errors_of: ErrorsOf, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.delattr("thud.studies.fit.search")
-    assert place in errors_of("fit", "-q", "-o", place, "study.toml")
-
-
-def test_fit_that_cannot_be_saved_is_refused_before_it_is_made(
-    tmp_path: Path, errors_of: ErrorsOf, monkeypatch: pytest.MonkeyPatch
+    place: str, tmp_path: Path, errors_of: ErrorsOf, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delattr("thud.studies.fit.search")
     (tmp_path / "found").mkdir()
     (tmp_path / "found/notes.txt").touch()
-    assert "found" in errors_of("fit", "-q", "-o", "found", "study.toml")
+    assert place in errors_of("fit", "-q", "-o", place, "study.toml")
 
 
 @pytest.mark.parametrize(
@@ -167,11 +160,7 @@ def test_fit_that_cannot_be_saved_is_refused_before_it_is_made(
         ("start", "begin", naming("'begin'", "start", "low", "high", "unit")),
         ("file", "files", naming("[target]", "file", "levels")),
         ("record.csv", "nowhere.csv", naming("nowhere.csv")),
-        (
-            "[target]",
-            "[targets]",
-            naming("'targets'", "'target'", "case", "fixed"),
-        ),
+        ("[target]", "[targets]", naming("'targets'", "'target'", "case", "fixed")),
         ("[target]", "case = 'no.nml'\n[target]", naming("no.nml")),
         ("[target]", "starts = 1.5\n[target]", naming("starts", 1.5, 1)),
         ("[target]", "seed = -1\n[target]", naming("seed", -1, 0)),
@@ -187,17 +176,9 @@ def test_fit_that_cannot_be_saved_is_refused_before_it_is_made(
         ("[target]", "[target]\nnoise = 0", naming("noise", 0)),
         ("[target]", "[target]\ntime_shift = 1", naming("time_shift", 1, "true", "false")),
         ("[target]", "[target]\nwindow = 3", naming("window", 3)),
-        (
-            'file = "record.csv"',
-            "levels = [39]",
-            naming("levels", [39], 5),
-        ),
+        ('file = "record.csv"', "levels = [39]", naming("levels", [39], 5)),
         ('file = "record.csv"', "levels = []\nbands = []", naming("bands", [])),
-        (
-            'file = "record.csv"',
-            "levels = [1]\nfrequencies = 3",
-            naming("frequencies", 3, 1),
-        ),
+        ('file = "record.csv"', "levels = [1]\nfrequencies = 3", naming("frequencies", 3, 1)),
         (
             'file = "record.csv"',
             "levels = [39, 31, 23, 17, 12]\ncontact_time = 20",

@@ -194,7 +194,7 @@ def test_files_state_unknowns(tmp_path: Path) -> None:
     text = "unknowns = {}\n[target]\nfile = 'record.csv'\n[parameters]\nyoungs_modulus = {{}}\n"
     path = tmp_path / "study.toml"
     path.write_text(text.format("['friction']"))
-    assert read_fit_study(path).options["unknowns"] == ["friction"]
+    assert read_fit_study(path).options.unknowns == ["friction"]
     path.write_text(text.format("['frictoin']"))
     with pytest.raises(thud.InputError, match=naming("unknowns")):
         read_fit_study(path)

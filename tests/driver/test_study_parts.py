@@ -175,16 +175,6 @@ def test_shift_is_that_of_williams_landel_and_ferry() -> None:
     assert Temperature(20.0, coefficient=-0.01).keys == ("youngs_modulus",)
 
 
-def test_modulus_of_a_case_changes_with_its_coefficient() -> None:
-    law = Temperature(15.0, coefficient=-0.004)
-    sets = {"temperature": np.array([15.0, 25.0, 5.0])}
-    found = law.apply(
-        thud.Case(ball=thud.Ball(youngs_modulus=2e6), model=thud.HollowSphere()), sets
-    )
-    assert found["youngs_modulus"] == pytest.approx([2e6, 1.92e6, 2.08e6])
-    assert set(found) == {"youngs_modulus"}
-
-
 @pytest.mark.parametrize(
     ("given", "words"),
     [

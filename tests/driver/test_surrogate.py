@@ -113,13 +113,6 @@ def test_margin_and_verdict_are_those_of_the_library(direct: thud.Uncertainty) -
     np.testing.assert_array_equal(found["conforms"], known["conforms"])
     assert not found["undecided"].any()
     assert 0 < found["conforms"].sum() < len(height)
-    # Errors of 1 cm leave the verdict undecided where the height is closer to its limits.
-    by = none + 0.01 * (np.arange(10) == 9)
-    close = np.minimum(np.abs(height - 0.99), np.abs(height - 1.01)) < 0.01
-    others = found["margin"] >= 0
-    np.testing.assert_array_equal(
-        assess_many(values, by, "rubber_ball")["undecided"], close & others
-    )
 
 
 def test_powers_of_a_lumped_source_are_learned() -> None:

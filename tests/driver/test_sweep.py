@@ -72,10 +72,7 @@ def test_dataset_tells_units_and_where_it_comes_from(tmp_path: Path) -> None:
 
 def test_other_makers_of_points_are_another_study(monkeypatch: pytest.MonkeyPatch) -> None:
     drawn = thud.read_study(
-        {
-            "design": {"kind": "sobol", "size": 2},
-            "parameters": {"height": {"low": 1, "high": 2}},
-        }
+        {"design": {"kind": "sobol", "size": 2}, "parameters": {"height": {"low": 1, "high": 2}}}
     )
     grid = thud.read_study(HEIGHTS)
     before = drawn.identity, grid.identity
@@ -154,13 +151,6 @@ def test_spreads_have_their_quantiles() -> None:
     assert (found["damping_law"] == "rising").mean() == pytest.approx(0.5, abs=1e-3)
 
 
-def test_fixed_value_is_the_middle_of_a_normal_distribution() -> None:
-    study: dict[str, Any] = {"design": {"kind": "latin_hypercube", "size": 1000}}
-    study |= {"fixed": {"mass": 3}, "parameters": {"mass": {"std": 0.1}}}
-    found = thud.read_study(study).parameter_columns(0, 1000)
-    assert found["mass"].mean() == pytest.approx(3, abs=1e-3)
-
-
 def test_list_pairs_values_and_entries_of_lists() -> None:
     found = thud.sweep(
         {
@@ -206,18 +196,6 @@ def test_density_and_temperature_act_on_mass_and_modulus() -> None:
     for place, modulus in enumerate((1.56e6, 1.404e6)):
         impact = thud.solve(thud.Ball(youngs_modulus=modulus))
         assert float(found["contact_time"][place]) == pytest.approx(impact.contact_time, rel=1e-12)
-
-
-def test_modulus_is_that_of_the_reference_temperature() -> None:
-    study: dict[str, Any] = {
-        "temperature": {"reference": 20, "coefficient": -0.01},
-        "parameters": {"temperature": {"values": [30]}, "youngs_modulus": {"values": [1.6e6]}},
-    }
-    modulus = thud.sweep(study).dataset["youngs_modulus"]
-    assert modulus.values.tolist() == [1.6e6]
-    assert "at 20 degC" in modulus.attrs["long_name"]
-    del study["temperature"], study["parameters"]["temperature"]
-    assert "degC" not in thud.sweep(study).dataset["youngs_modulus"].attrs["long_name"]
 
 
 WLF = {"reference": 20, "c1": 8.0, "c2": 120.0}
