@@ -6,7 +6,6 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from thud.base.display import warn_if_not_drawn
 from thud.base.errors import NumericalError, ThudError
 from thud.base.files import replace_file
 from thud.base.tables import format_rows
@@ -56,12 +55,8 @@ def run_study(options: argparse.Namespace) -> int:
             )  # fmt: skip
     except ThudError as error:
         raise error.within(options.study) from error
-    if figures:
-        with warn_if_not_drawn("the figure of the study"):
-            from thud.plot.save_figures import figure_files
-
-            for name, content in figure_files({study.name: computed.plot()}).items():
-                replace_file(folder / name, content)
+    for name, content in figures_of(options, {study.name: computed.plot}).items():
+        replace_file(folder / name, content)
     return _print(options, computed, folder, succeeded=True)
 
 
