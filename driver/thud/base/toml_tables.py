@@ -67,9 +67,9 @@ def require_table(name: str, value: object) -> Mapping[str, Any]:
     return value if isinstance(value, Mapping) else refuse_value(name, value, "a table")
 
 
-def key(check: Check, meaning: str, default: object = None) -> Any:  # noqa: ANN401 - a field of any type
-    """Declare a key: its check, which returns the value or raises InputError, and its meaning."""
-    metadata = {"check": check, "meaning": meaning}
+def key(check: Check, title: str, default: object = None, hint: str = "") -> Any:  # noqa: ANN401 - a field of any type
+    """Declare a key: its check, which returns the value or raises InputError, title and hint."""
+    metadata = {"check": check, "title": title, "hint": hint}
     if default == {}:
         return field(default_factory=dict, metadata=metadata)
     return field(default=default, metadata=metadata)

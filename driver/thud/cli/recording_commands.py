@@ -48,9 +48,10 @@ FLAGS = {"begin": "--from", "end": "--to"}
 def _option(name: str) -> Argument:
     """Return the option of a key of the configuration."""
     entry = Config.__dataclass_fields__[name].metadata
+    help_text = ", ".join(filter(None, (entry["title"], entry["hint"])))
     # Of the check of a number or a choice.
     limits = getattr(entry["check"], "keywords", {})
-    settings: dict[str, Any] = {"dest": name, "help": entry["meaning"]}
+    settings: dict[str, Any] = {"dest": name, "help": help_text}
     if "allowed" in limits:
         settings["choices"] = tuple(limits["allowed"])
     else:

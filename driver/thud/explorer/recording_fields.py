@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field, fields
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
 
 # Tables of a configuration; the names of their fields begin with that of the table.
 TABLES: dict[str, type[TomlTable]] = {"plate": Plate, "filter": RecorderFilter}
+OWNERS = {"plate": "Force plate: ", "filter": "Filter of the recorder: "}
 PERCENT = "%"
 # Keys with a field, and those whose fields are folded away.
 SHOWN = (
@@ -99,13 +99,8 @@ def _fields() -> Iterator[Field]:
         table, key = Field(name, "").path
         owner = TABLES[table] if table else Config
         declared = next(entry.metadata for entry in fields(owner) if entry.name == key)
-        check, meaning = declared["check"], declared["meaning"]
-        # Further clauses are hints.
-        title, *hints = re.split(r"[,:] ", meaning, maxsplit=1)
-        hint = "".join(hints)
-        words = title.partition(" of the ")[0] if key in {"height", "mass"} else title
-        label = f"{humanize(table)} of the recorder: {words}" if table == "filter" else words
-        label = f"Force plate: {words}" if table == "plate" else label
+        check, hint = declared["check"], declared["hint"]
+        label = OWNERS.get(table, "") + declared["title"]
         label = label[:1].upper() + label[1:].replace(" -", " −")
         if not isinstance(check, partial):
             yield Field(name, label, "text", hint=hint, folded=name in FOLDED)

@@ -165,7 +165,7 @@ def open_source(
     the file that is not applied.
     """
     if isinstance(record, Signal):
-        return record, "" if unit is None else require_unit(unit, record.name), ""
+        return record, "" if unit is None else require_unit(record.name, unit), ""
     path = regular_file(record)
     name = shown_text(path)
     channels = choose_channels(read_channels(path), Config(channel=channel), name)
@@ -175,7 +175,7 @@ def open_source(
             f"channel (--channel) = one of {channel_choices(channels)}",
         )
     (source,) = channels
-    symbol = find_unit(source.unit) if unit is None else require_unit(unit, path.name)
+    symbol = find_unit(source.unit) if unit is None else require_unit(path.name, unit)
     rate = math.nan if source.sample_rate is None else source.sample_rate
     # Integers are read as fractions of full scale.
     full_scale = 1.0 if source.counts else None

@@ -68,11 +68,6 @@ def to_channel(name: str, value: object) -> int | str:
     return require_whole(name, value, 1, MAX_CHANNEL) if is_number else to_line(name, value)
 
 
-def to_unit(name: str, value: object) -> str:
-    """Return the unit of recorded values that a text names."""
-    return require_unit(value, name)
-
-
 def to_channels(name: str, value: object) -> str | tuple[int | str, ...]:
     """Return ``"sum"`` or names and numbers of channels; raise InputError if they are neither.
 
@@ -224,28 +219,32 @@ class Config(TomlTable):
     laboratory: str = key(to_line, "name of the laboratory", "")
     ball: str = key(to_line, "name of the ball", "")
     serial: str = key(to_line, "serial number of the ball", "")
-    date: str = key(to_date, "date of the measurement; by default that of the files", "")
+    date: str = key(to_date, "date of the measurement", "", "by default that of the files")
     source: LimitsSource = key(one_of(SOURCES), "source whose limits apply", SOURCES[0])
     temperature: float | None = key(between(-273.15, 200.0, "degC"), "temperature of ball and air")
     instruments: tuple[Instrument, ...] = key(
         to_instruments, "names of instruments, or tables with their certificates", ()
     )
-    channel: int | str | None = key(to_channel, "channel of the force, by number or name")
+    channel: int | str | None = key(to_channel, "channel of the force", hint="by number or name")
     channels: str | tuple[int | str, ...] | None = key(
-        to_channels, "load cells whose forces are added: sum for all channels of force"
+        to_channels, "load cells whose forces are added", hint="sum for all channels of force"
     )
-    unit: str | None = key(to_unit, "unit of the recorded values, if the file does not state it")
+    unit: str | None = key(
+        require_unit, "unit of the recorded values", hint="if the file does not state it"
+    )
     calibration: Calibration | float | tuple[Calibration | float, ...] | None = key(
-        to_calibrations, 'calibration: factors such as 250, "250 N/V" or "4.1 pC/N, 10 mV/pC"'
+        to_calibrations,
+        "calibration",
+        hint='factors such as 250, "250 N/V" or "4.1 pC/N, 10 mV/pC"',
     )
     calibration_uncertainty: float | None = key(
-        between(0.0, 0.5), "relative standard uncertainty of the calibration, such as 0.005"
+        between(0.0, 0.5), "relative standard uncertainty of the calibration", hint="such as 0.005"
     )
     polarity: str | None = key(one_of(POLARITIES), "sign of a compression in the file")
     sample_rate: float | None = key(
-        between(1.0, 1e9, "Hz"), "sample rate, if the file does not state it"
+        between(1.0, 1e9, "Hz"), "sample rate", hint="if the file does not state it"
     )
-    mass: float | None = key(between(0.01, 1000.0, "kg"), "mass of the source")
+    mass: float | None = key(between(0.01, 1000.0, "kg"), "mass", hint="of the source")
     # Above 10 m it is likely to be stated in cm.
     height: float | None = key(between(0.001, 10.0, "m"), "drop height")
     mass_uncertainty: float | None = key(
@@ -257,7 +256,7 @@ class Config(TomlTable):
     plate: Plate | None = key(Plate.read, "the force plate")
     filter: RecorderFilter | None = key(RecorderFilter.read, "the low-pass filter of the recorder")
     drops: str | None = key(
-        to_numbers, 'drops to be measured, such as "1-5, 8"; they count over all files'
+        to_numbers, "drops to be measured", hint='such as "1-5, 8"; they count over all files'
     )
     leave_out: Mapping[str, str] = key(
         to_reasons, 'drops to be left out, with the reason: {"3": "touched"}', {}

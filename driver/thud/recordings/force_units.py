@@ -84,8 +84,8 @@ class Calibration:
             value = float(match["value"]) if match else 0.0
             if not match or not SIZES[0] < abs(value) < SIZES[1]:
                 refuse(f"{label} is not a number with units", EXAMPLES, subject="calibration")
-            top, top_size = size_of(require_unit(match["top"], label))
-            bottom, bottom_size = size_of(require_unit(match["bottom"], label))
+            top, top_size = size_of(require_unit(label, match["top"]))
+            bottom, bottom_size = size_of(require_unit(label, match["bottom"]))
             factors.append(Factor(value * top_size / bottom_size, top, bottom))
         return factors
 
@@ -101,7 +101,7 @@ class Calibration:
         return ends[0] if len(ends) == 1 else ""
 
 
-def require_unit(text: object, label: str) -> str:
+def require_unit(label: str, text: object) -> str:
     """Return the unit of recorded values that a text names; raise InputError if it names none."""
     unit = find_unit(text) if isinstance(text, str) else ""
     if unit not in RECORDED:

@@ -54,11 +54,14 @@ class Plate(TomlTable):
         between(0.0, 0.5), "relative standard uncertainty of the resonance"
     )
     share: float | None = key(
-        between(0.001, 1.0), "share of this mode in the static response, 1 for a mass on a spring"
+        between(0.001, 1.0),
+        "share of this mode in the static response",
+        hint="1 for a mass on a spring",
     )
     flat_limit: float | None = key(
         between(100.0, 1e6, "Hz"),
-        "frequency up to which the response is flat within 2 %, if no resonance is stated",
+        "frequency up to which the response is flat within 2 %",
+        hint="if no resonance is stated",
     )
     time_constant: float | None = key(between(1e-3, 1e9, "s"), "time constant of the amplifier")
     full_scale: float | None = key(
@@ -113,7 +116,7 @@ class RecorderFilter(TomlTable):
 
     title = "filter: "
     kind: str = key(
-        one_of((*KINDS, "none")), "Bessel or Butterworth; none if its response is flat in the bands"
+        one_of((*KINDS, "none")), "kind", hint="none if its response is flat in the bands"
     )
     order: int | None = key(partial(require_whole, low=1, high=MAX_ORDER), "order")
     cutoff: float = key(between(1.0, 1e9, "Hz"), "cutoff at -3 dB", math.nan)
