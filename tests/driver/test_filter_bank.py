@@ -181,7 +181,7 @@ def test_silence_around_a_record_changes_nothing() -> None:
         ([], 44100, naming("force")),
         ([0.0, 0.0], 44100, naming("force")),
         ([1.0, np.nan], 44100, naming("force", "finite")),
-        ([1.0, 2.0], -1.0, naming("sample_rate", "-1.0", 0)),
+        ([1.0, 2.0], -1.0, naming("sample_rate", "-1.0", "1 to 1e+09 Hz")),
         ([1.0, 2.0], np.nan, naming("sample_rate", "nan")),
         ([1.0, 2.0], "fast", naming("sample_rate", "'fast'")),
     ],

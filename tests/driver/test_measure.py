@@ -402,7 +402,12 @@ def test_plate_is_that_of_the_configuration(tmp_path: Path) -> None:
         "f0_uncertainty = 1e-4\ntime_constant = 1\nfull_scale = 4e3\nlinearity = [[5, 5], [5e3, 5e3]] #",  # noqa: E501
     )
     found = example("drop_1.wav", tmp_path, plate)
-    assert [one.met for one in check_plate(found.config.plate)] == [False, True, False, True]
+    assert [met for met, _ in check_plate(found.config.plate).values()] == [
+        False,
+        True,
+        False,
+        True,
+    ]
     assert noted(found.notes, "plate_low").others["frequency"] == 0.2
     assert noted(found.notes, "plate_range").value == 4000
 

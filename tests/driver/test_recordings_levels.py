@@ -449,29 +449,33 @@ def test_resonance_near_the_bands_is_refused() -> None:
         correct_force(np.ones(100), 25600.0, Chain((Plate(900, 30),)))
 
 
+def met(plate: Plate) -> list[bool | None]:
+    """Return whether the requirements on a plate are met."""
+    return [entry for entry, _ in check_plate(plate).values()]
+
+
 def test_plate_is_compared_with_the_standard() -> None:
-    assert [check.met for check in check_plate(Plate())] == [None] * 4
-    paper = check_plate(Plate(1600, 30, full_scale=4000.0, time_constant=1.0))
-    assert [check.met for check in paper] == [False, None, False, None]
-    assert (paper[2].note.code, paper[2].note.value) == ("plate_range", 4000.0)
+    assert met(Plate()) == [None] * 4
+    paper = Plate(1600, 30, full_scale=4000.0, time_constant=1.0)
+    assert met(paper) == [False, None, False, None]
+    note = check_plate(paper)["range"][1]
+    assert (note.code, note.value) == ("plate_range", 4000.0)
     # A time constant of 3.92 s is just enough: 2 %.
-    edge = check_plate(Plate(full_scale=5000.0, time_constant=3.92))
-    assert [edge[0].met, edge[2].met] == [True, True]
-    assert check_plate(Plate(time_constant=3.9))[0].met is False
+    assert met(Plate(full_scale=5000.0, time_constant=3.92)) == [True, None, True, None]
+    assert met(Plate(time_constant=3.9))[0] is False
     # Of a resonance that is less by 1.96 uncertainties, (1 - r2)/(1 - r2/(1 - s)2) is 1.02.
     square = (1000 / 1600) ** 2
     shift = 1 - np.sqrt(square / (1 - (1 - square) / 1.02))
-    for factor, met in ((0.999, True), (1.001, False)):
-        plate = Plate(1600, 1e6, f0_uncertainty=factor * shift / 1.96)
-        assert check_plate(plate)[1].met == met
+    for factor, expected in ((0.999, True), (1.001, False)):
+        assert met(Plate(1600, 1e6, f0_uncertainty=factor * shift / 1.96))[1] == expected
     forces = [500.0, 1000.0, 2000.0, 5000.0]
-    for indicated, met in (
+    for indicated, expected in (
         ([1.3 * f * (1 + 0.001 * i) for i, f in enumerate(forces)], True),
         ([f * (1 + f / 5e4) for f in forces], False),
         (forces[:3], None),
     ):
         pairs = tuple(zip(forces, indicated, strict=False))
-        assert check_plate(Plate(linearity=pairs))[3].met == met
+        assert met(Plate(linearity=pairs))[3] == expected
     with pytest.raises(thud.InputError, match=naming("plate", "linearity", "pairs")):
         Plate(linearity=((0.0, 1.0),))
 
@@ -629,9 +633,7 @@ def test_verdict_names_each_criterion_of_the_library() -> None:
     ("options", "words"),
     [
         ({"levels": NOMINAL[:4]}, naming("levels", 4, 5)),
-        ({"levels": None}, naming("levels", None)),
         ({"source": "bowling_ball"}, naming("'bowling_ball'", "'rubber_ball'")),
-        ({"limits": [1]}, naming("limits", [1], "Mapping")),
         ({"limits": {"octave_64": (1, 2)}}, naming("limits", "'octave_64'", "'octave_63'")),
         ({"limits": {"mass": ("a", 1)}}, naming("limits: mass")),
         ({"limits": {"mass": (1, 2, 3)}}, naming("limits: mass", [1, 2, 3])),

@@ -10,6 +10,7 @@ from scipy.signal import butter, resample, sosfilt
 
 from thud.base.checks import refuse, require_array, require_number
 from thud.level.levels import get_bands
+from thud.recordings.signal import RATES
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -37,7 +38,7 @@ def band_filters(bands: BandSet, sample_rate: float) -> NDArray[np.float64]:
     Second-order sections need no decimation: even at 1 MHz the attenuation of the lowest band is
     accurate to 1e-6 dB.
     """
-    _require_rate(sample_rate)
+    require_number("sample_rate", sample_rate, *RATES, "Hz")
     edges = get_bands(bands)
     sections = np.full((len(edges.nominal), ORDER, 6), np.nan)
     for band in np.flatnonzero(MIN_RATIO * edges.upper <= sample_rate * (1 + 1e-12)):
@@ -59,7 +60,7 @@ def filter_levels(
     record = require_array("force", force, (1,), "iuf")
     if not np.isfinite(record).all() or not record.any():
         refuse("force is empty, zero throughout or not finite", "a force record, N")
-    _require_rate(sample_rate)
+    require_number("sample_rate", sample_rate, *RATES, "Hz")
     edges = get_bands(bands)
     inside = edges.upper < sample_rate / 2
     levels = np.full(len(inside), np.nan)
@@ -78,9 +79,3 @@ def filter_levels(
         filtered = sosfilt(sections[band], np.pad(record, (0, decays[band])))
         levels[band] = 10 * np.log10(filtered @ filtered / rate)
     return levels
-
-
-def _require_rate(sample_rate: float) -> None:
-    require_number("sample_rate", sample_rate)
-    if sample_rate <= 0:
-        refuse(f"sample_rate = {sample_rate} is not allowed", "sample_rate > 0")

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
     from thud.recordings.signal import Signal
 
+    Tap = tuple[NDArray[np.float64], NDArray[np.float64]]
+
 # Minimum quality factor of a resonance, minimum ratio of its energy to that of the noise, and
 # maximum number of resonances.
 MIN_QUALITY = 2.0
@@ -221,15 +223,11 @@ def _mean(estimates: list[tuple[float, float]]) -> tuple[float, float]:
     return math.exp(value.mean()), factor * float(value.std(ddof=1)) / math.sqrt(count)
 
 
-class _Tap(NamedTuple):
-    """The level from the peak of a tap on, and before it."""
+def _find_taps(level: NDArray[np.float64], rate: float, name: str) -> list[Tap]:
+    """Return the level from the peak of each tap on, and before it.
 
-    after: NDArray[np.float64]
-    before: NDArray[np.float64]
-
-
-def _find_taps(level: NDArray[np.float64], rate: float, name: str) -> list[_Tap]:
-    """Return the taps of a record; raise InputError if there is none."""
+    Raise InputError if there is none.
+    """
     # Zeros on both sides end a pulse that is cut off.
     pulses = np.pad(np.abs(level - np.median(level)), 1) if level.size else np.zeros(2)
     height = max(MIN_RISE * float(np.median(pulses)), MIN_HEIGHT * float(pulses.max()))
@@ -248,7 +246,7 @@ def _find_taps(level: NDArray[np.float64], rate: float, name: str) -> list[_Tap]
     # The second half of what lies between two taps is quiet.
     quiet = [0, *(tops[1:] + tops[:-1]) // 2]
     return [
-        _Tap(
+        (
             level[top : min(end, top + after)],
             level[max(start, top - before) : max(top - contact, 0)],
         )
@@ -256,21 +254,22 @@ def _find_taps(level: NDArray[np.float64], rate: float, name: str) -> list[_Tap]
     ]
 
 
-def _fit_tap(tap: _Tap, rate: float) -> list[Mode]:
+def _fit_tap(tap: Tap, rate: float) -> list[Mode]:
     """Return the modes that ring after a tap, with amplitudes at its peak.
 
     If what remains is noise after each contact has ended, the fit begins as early as it is.
     """
     late: list[Mode] = []
+    after, before = tap
     for start in (CONTACT, *STARTS):
         modes = [
             mode._replace(amplitude=mode.amplitude * math.exp(math.pi * start * f / mode.quality))
-            for mode in fit_modes(tap.after[round(start * rate) :], rate, tap.before)
+            for mode in fit_modes(after[round(start * rate) :], rate, before)
             if (f := mode.frequency)
         ]
         if start == CONTACT:
             late = modes
-            if len(tap.before) < MIN_LENGTH or _misfit(late):
+            if len(before) < MIN_LENGTH or _misfit(late):
                 break
         elif modes and not _misfit(modes):
             return modes
@@ -357,6 +356,6 @@ def _spectrum(
     values: NDArray[np.float64], rate: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return frequencies, Hz, and power; that of white noise is its variance at each of them."""
-    power = np.abs(np.fft.rfft(values, max(len(values), 1))) ** 2 / max(len(values), 1)
-    frequency = np.fft.rfftfreq(max(len(values), 1), 1 / rate)
-    return np.asarray(frequency[1:], dtype=np.float64), np.asarray(power[1:])
+    count = max(len(values), 1)
+    power = np.abs(np.fft.rfft(values, count)) ** 2 / count
+    return np.asarray(np.fft.rfftfreq(count, 1 / rate)[1:]), np.asarray(power[1:])

@@ -19,12 +19,7 @@ from thud.recordings.checks.plate import check_plate
 from thud.recordings.config import Config
 from thud.recordings.instruments import CALIBRATION, check_instruments, instrument_uncertainties
 from thud.recordings.measured_drop import ESTIMATES
-from thud.recordings.quantities import (
-    GRAVITY,
-    IMPULSE,
-    check_estimates,
-    drop_estimates,
-)
+from thud.recordings.quantities import GRAVITY, IMPULSE, check_estimates, drop_estimates
 from thud.recordings.recorded_levels import average_levels, mean_force, measure_levels
 
 if TYPE_CHECKING:
@@ -173,7 +168,7 @@ class Recording(ImpactOrRecording):
         config = self.config
         notes = [
             *check_estimates(self.drops, self.estimates, config),
-            *(check.note for check in check_plate(config.plate) if check.met is False),
+            *(note for met, note in check_plate(config.plate).values() if met is False),
             *config.check_dates(origin.date for origin in self.origins),
             *check_instruments(self.drops, config, self.average().instruments),
         ]
@@ -229,13 +224,10 @@ class Recording(ImpactOrRecording):
     def average(self, bands: BandSet = "octave") -> AverageLevels:
         """Return the energy average of the levels, whose budget includes the instruments."""
         if bands not in self._averages:
-            self._averages[bands] = average_levels(
-                measure_levels(self.drops, bands),
-                instrument_uncertainties(
-                    self.drops, self.config, self.calibration_uncertainty, bands
-                ),
-                self.not_stated["levels"],
-            )
+            levels, stated = measure_levels(self.drops, bands), self.calibration_uncertainty
+            instruments = instrument_uncertainties(self.drops, self.config, stated, bands)
+            average = average_levels(levels, instruments, self.not_stated["levels"])
+            self._averages[bands] = average
         return self._averages[bands]
 
     def levels(

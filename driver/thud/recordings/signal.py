@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
     from thud.recordings.formats import Samples
 
+# Range of sample rates, Hz.
+RATES = (1.0, 1e9)
 # Peak forces of heavy/soft sources, N: from drops of some centimeters to the tyre on stiff floors.
 PEAKS = (300.0, 15000.0)
 # Maximum factor beyond this range that a drop height can explain.
@@ -91,10 +93,8 @@ class Signal(Immutable):
     def from_array(cls, force: ArrayLike, sample_rate: float, name: str = "recording") -> Signal:
         """Return the signal of a force in memory, N, shape (n_sample,)."""
         values = finite_array(f"{name}: force", force)
-        require_number(f"{name}: sample_rate", sample_rate)
-        if not sample_rate > 0:
-            refuse(f"{name}: sample_rate = {sample_rate:g}", "positive numbers, Hz")
-        return cls(name, "", float(sample_rate), len(values), freeze(values.copy()))
+        rate = require_number(f"{name}: sample_rate", sample_rate, *RATES, "Hz")
+        return cls(name, "", rate, len(values), freeze(values.copy()))
 
     @cached_property
     def checksum(self) -> str:

@@ -94,8 +94,8 @@ def report_data(recording: Recording) -> dict[str, Any]:
         },
         "drops": [_drop(drop) for drop in recording.drops],
         "plate": [
-            {"requirement": check.requirement, "met": check.met, "reason": str(check.note)}
-            for check in check_plate(config.plate)
+            {"requirement": name, "met": met, "reason": str(note)}
+            for name, (met, note) in check_plate(config.plate).items()
         ],
         "left_out": sentences(recording, lambda note: note.code == LEFT_OUT),
         "processing": sentences(

@@ -45,7 +45,9 @@ def check(origins: Sequence[Origin], drops: Sequence[Sequence[Drop]]) -> None:
                 "each record once: repeatability is the scatter of different drops",
             )
         for one, other in product(ones, others):
-            if first.path and later.path == first.path and _overlap(one, other):
+            early, late = sorted((one, other), key=lambda drop: drop.onset)
+            is_simultaneous = late.onset < early.onset + early.contact_time.value
+            if first.path and later.path == first.path and is_simultaneous:
                 refuse(
                     f"{later.name}: has drops at the same instants as {first.name}; simultaneous "
                     "forces are never averaged",
@@ -57,12 +59,6 @@ def check(origins: Sequence[Origin], drops: Sequence[Sequence[Drop]]) -> None:
                     f"{other.name}: is the same drop as {one.name}: its noise is the same",
                     "each drop once: repeatability is the scatter of different drops",
                 )
-
-
-def _overlap(one: Drop, other: Drop) -> bool:
-    """Whether two drops of one file are in contact at the same time."""
-    early, late = sorted((one, other), key=lambda drop: drop.onset)
-    return late.onset < early.onset + early.contact_time.value
 
 
 def _is_same(one: Drop, other: Drop) -> bool:

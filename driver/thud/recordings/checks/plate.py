@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,25 +25,16 @@ UNKNOWN = {
 }
 
 
-class PlateCheck(NamedTuple):
-    """A requirement on the force plate, whether it is met (None if unknown), and a note on it.
-
-    Requirements: ``"flat above"`` (0.2 Hz), ``"flat below"`` (1000 Hz), ``"range"``, ``"linear"``.
-    """
-
-    requirement: str
-    met: bool | None
-    note: Note
-
-
-def check_plate(plate: Plate | None) -> tuple[PlateCheck, ...]:
+def check_plate(plate: Plate | None) -> dict[str, tuple[bool | None, Note]]:
     """Check a plate by the standard: flat from 0.2 to 1000 Hz, 0 to 5000 N, linear within 2 %.
 
-    The resonance of the plate is corrected: what counts is the uncertainty of its frequency.
-    Nothing is checked if no plate is stated.
+    Return whether each requirement is met (None if unknown), and a note on it, by requirement:
+    ``"flat above"`` (0.2 Hz), ``"flat below"`` (1000 Hz), ``"range"``, ``"linear"``. The resonance
+    of the plate is corrected: what counts is the uncertainty of its frequency. Nothing is checked
+    if no plate is stated.
     """
     if plate is None:
-        return ()
+        return {}
     known: dict[str, tuple[bool | None, Note]] = {}
     low, high = FLAT
     if plate.time_constant:
@@ -79,10 +70,10 @@ def check_plate(plate: Plate | None) -> tuple[PlateCheck, ...]:
             "plate_linear", 100 * deviations[worst], first=applied.min(), last=applied.max(),
             worst=applied[worst],
         )  # fmt: skip
-    return tuple(
-        PlateCheck(name, *known.get(name, (None, _note("plate_unknown", math.nan, **unknown))))
+    return {
+        name: known.get(name, (None, _note("plate_unknown", math.nan, **unknown)))
         for name, unknown in UNKNOWN.items()
-    )
+    }
 
 
 def _note(code: str, value: float, unit: str = "%", **others: float | str) -> Note:
