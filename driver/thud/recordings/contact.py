@@ -288,11 +288,8 @@ def find_edge(
         # steps that does not reach them, up to the other edge.
         limit = THRESHOLD * background.peak + 1.5 * quantization.step
         later = side * np.flatnonzero(force > limit) / rate
-        rise = (
-            quantization.offset
-            / quantization.step
-            * (later[later > middle].min(initial=side * other / rate) - middle)
-        )
+        rise = later[later > middle].min(initial=side * other / rate) - middle
+        rise *= quantization.offset / quantization.step
     return (
         Estimate(side * mean, math.hypot(deviation, TOUCH_ERRORS[side < 0])),
         Estimate(side * middle, math.hypot(math.sqrt(variance), correction, rise)),

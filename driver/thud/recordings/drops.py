@@ -251,20 +251,15 @@ def cut_section(signal: Signal, pulse: Pulse) -> Section:
         Section(cell.name, cell.read(first, stop), rate, first, contact, full_scale=cell.full_scale)
         for cell in signal.cells
     )
-    return Section(
-        pulse.name,
-        np.sum([cell.force for cell in cells], axis=0) if cells else signal.read(first, stop),
-        rate,
-        first,
-        contact,
-        tuple(
-            cut_section(signal, replace(bounce, name=f"{pulse.name}, bounce {k}"))
-            for k, bounce in enumerate(pulse.bounces, start=1)
-        ),
-        cells,
-        signal.full_scale,
-        notes=pulse.notes,
+    force = np.sum([cell.force for cell in cells], axis=0) if cells else signal.read(first, stop)
+    bounces = tuple(
+        cut_section(signal, replace(bounce, name=f"{pulse.name}, bounce {k}"))
+        for k, bounce in enumerate(pulse.bounces, start=1)
     )
+    return Section(
+        pulse.name, force, rate, first, contact, bounces, cells, signal.full_scale,
+        notes=pulse.notes,
+    )  # fmt: skip
 
 
 def robust_deviation(values: NDArray[np.float64]) -> float:

@@ -22,14 +22,7 @@ from thud.recordings.checks import CONTACT_CHECKS
 from thud.recordings.contact import SAMPLE_ERROR, Contact, find_edge
 from thud.recordings.drops import Stage, robust_deviation
 from thud.recordings.instruments import peak_uncertainty
-from thud.recordings.quantities import (
-    BOUNCES,
-    GRAVITY,
-    IMPULSE,
-    MASS,
-    RESTITUTION,
-    measure_rebound,
-)
+from thud.recordings.quantities import BOUNCES, GRAVITY, IMPULSE, MASS, RESTITUTION, measure_rebound
 from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.ringing import find_ringing, is_in_record
 
@@ -211,26 +204,18 @@ def measure_drop(
         if not section.chain:
             # A resonance spreads an edge over a quarter of its period.
             contact_time = contact_time.widened(0.25 / ringing.frequency / RECTANGULAR)
+    onset = (section.start + contact.start) / section.sample_rate + contact.touch.value
+    restitutions = {
+        name: estimates[name] for name in (IMPULSE, BOUNCES) if math.isfinite(estimates[name].value)
+    }
     drop = Drop(
-        name=section.name,
-        onset=(section.start + contact.start) / section.sample_rate + contact.touch.value,
-        contact=contact,
-        contact_time=contact_time,
-        restitution=estimates[RESTITUTION],
-        peak_force=peak_force,
-        impulse=impulse,
-        effective_mass=estimates[MASS],
-        restitutions={
-            name: estimates[name]
-            for name in (IMPULSE, BOUNCES)
-            if math.isfinite(estimates[name].value)
-        },
-        shared_effects=shared,
+        section.name, onset, contact, contact_time, estimates[RESTITUTION], peak_force, impulse,
+        estimates[MASS], restitutions, shared,
         bounce=landing.value - contact.touch.value if landing else None,
         notes=tuple(replace(note, subject=note.subject or section.name) for note in notes),
         ringing=ringing,
         plate_recorded=is_in_record(recorded, contact, plate) if recorded and plate else None,
-    )
+    )  # fmt: skip
     return replace(drop, peak_force=peak_force.widened(peak_uncertainty(drop, config)))
 
 

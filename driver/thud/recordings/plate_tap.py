@@ -14,16 +14,9 @@ from scipy.special import chdtrc, fdtrc, stdtrit
 from thud.base.checks import refuse
 from thud.base.note import Note
 from thud.level.estimate import NORMAL_FACTOR
+from thud.recordings import ringing
 from thud.recordings.calibration import open_source
-from thud.recordings.ringing import (
-    DECAYS,
-    HIGHEST,
-    MIN_FREQUENCY,
-    closest,
-    fit_oscillations,
-    matched_energy,
-    resonance,
-)
+from thud.recordings.ringing import closest, resonance
 
 if TYPE_CHECKING:
     import os
@@ -199,17 +192,12 @@ def calibrate_tap(
             "only",
             f"an uncertainty up to {MAX_UNCERTAINTY:.0%}",
         )
-    misfit = _misfit(firsts)
+    misfit, others = _misfit(firsts), [m for m in max(fits, key=len) if shift(m) >= SAME]
     return TappedPlate(
-        frequency,
-        quality,
-        math.hypot(u_frequency, CLOCK),
-        u_quality,
-        len(firsts),
-        tuple(mode.frequency for mode in max(fits, key=len) if shift(mode) >= SAME),
-        name,
+        frequency, quality, math.hypot(u_frequency, CLOCK), u_quality, len(firsts),
+        tuple(mode.frequency for mode in others), name,
         (Note("tap_misfit", name, misfit),) if misfit > MIN_MISFIT else (),
-    )
+    )  # fmt: skip
 
 
 def _mean(estimates: list[tuple[float, float]]) -> tuple[float, float]:
@@ -296,7 +284,7 @@ def fit_modes(level: NDArray[np.float64], rate: float, quiet: NDArray[np.float64
         parameters = np.vstack([parameters, trial])
         length = round(DECAY_TIMES / math.exp(parameters[:, 1].min()) * rate)
         used = level[: max(length, MIN_LENGTH)]
-        parameters, inverse = fit_oscillations(used, parameters, rate)
+        parameters, inverse = ringing.fit_oscillations(used, parameters, rate)
         if any(resonance(f, math.exp(-decay))[1] < MIN_QUALITY for f, decay in parameters):
             break
         modes = _describe(used, parameters, inverse, rate, noise)
@@ -305,13 +293,13 @@ def fit_modes(level: NDArray[np.float64], rate: float, quiet: NDArray[np.float64
 
 def _strongest(level: NDArray[np.float64], rate: float) -> tuple[float, float] | None:
     """Return the parameters of the strongest oscillation; None if it does not exceed the noise."""
-    frequency, energy = matched_energy(level, rate, DECAYS)
-    inside = (frequency >= MIN_FREQUENCY) & (frequency <= HIGHEST * rate)
+    frequency, energy = ringing.matched_energy(level, rate, ringing.DECAYS)
+    inside = (frequency >= ringing.MIN_FREQUENCY) & (frequency <= ringing.HIGHEST * rate)
     frequency, energy = frequency[inside], energy[:, inside]
     k, index = np.unravel_index(np.argmax(energy), energy.shape)
     if not energy[k, index] > MIN_ENERGY * np.median(energy[k]):
         return None
-    return float(frequency[index]), -math.log(DECAYS[k])
+    return float(frequency[index]), -math.log(ringing.DECAYS[k])
 
 
 def _describe(

@@ -100,14 +100,9 @@ class Plate(TomlTable):
             others={"quality": self.Q, "gain": gain},
         )  # fmt: skip
 
-    def require_above(self, edge: float) -> None:
-        """Raise InputError if the resonance is below 1.41 times the highest edge of bands, Hz."""
-        if self.f0 < MIN_RATIO * edge:
-            refuse(
-                f"plate: the resonance, {self.f0:.5g} Hz, is too close "
-                f"to the bands, which reach up to {edge:.5g} Hz, for a correction",
-                f"{MIN_RATIO * edge:.5g} Hz or more",
-            )
+    def limit(self, edge: float) -> tuple[str, float, float]:
+        """Return what limits bands up to an edge, Hz, its frequency and the lowest one, Hz."""
+        return "plate: the resonance", self.f0, MIN_RATIO * edge
 
 
 @dataclass(frozen=True)
@@ -159,15 +154,9 @@ class RecorderFilter(TomlTable):
             others={"kind": self.kind.capitalize(), "order": self.order or 0},
         )  # fmt: skip
 
-    def require_above(self, edge: float) -> None:
-        """Raise InputError if the response is below 1/3 at the highest edge of bands, Hz."""
-        if self.highest < edge:
-            refuse(
-                f"filter: the cutoff, {self.cutoff:.5g} Hz, is too low for the bands, "
-                f"which reach up to {edge:.5g} Hz: the response falls to 1/3 at "
-                f"{self.highest:.5g} Hz",
-                f"{self.cutoff * edge / self.highest:.5g} Hz or more",
-            )
+    def limit(self, edge: float) -> tuple[str, float, float]:
+        """Return what limits bands up to an edge, Hz, its frequency and the lowest one, Hz."""
+        return "filter: the cutoff", self.cutoff, self.cutoff * edge / self.highest
 
 
 @dataclass(frozen=True)
@@ -224,8 +213,12 @@ def correct_force(
     is in Hz. Raise InputError if a response does not allow a correction up to the highest edge of
     the one-third-octave bands.
     """
+    edge = get_bands("third").upper[-1]
     for instrument in chain.instruments:
-        instrument.require_above(get_bands("third").upper[-1])
+        name, frequency, lowest = instrument.limit(edge)
+        if frequency < lowest:
+            problem = f"{name}, {frequency:.5g} Hz, is too close to the bands up to {edge:.5g} Hz"
+            refuse(problem, f"{lowest:.5g} Hz or more")
     # The impulse response decays within some periods of the highest corrected frequency.
     margin = math.ceil(20 * sample_rate / chain.highest)
     return filtered(force, sample_rate, chain.correction, margin)

@@ -142,19 +142,13 @@ def add_signals(cells: Sequence[Signal], name: str) -> Signal:
             )
         common = [replace(note, subject=name) for note in cell.notes]
         notes += [note for note in common if note not in notes]
-    return Signal(
-        name,
-        first.path,
-        first.sample_rate,
-        first.n_sample,
-        partial(_read_sum, tuple(cells)),
-        date=first.date,
+    return replace(
+        first, name=name, samples=partial(_read_sum, tuple(cells)), scale=1.0, full_scale=None,
         calibration="; ".join(dict.fromkeys(cell.calibration for cell in cells)),
         # The reference of all calibrations is usually the same.
         calibration_uncertainty=None if None in known else max(value or 0.0 for value in known),
-        notes=(*notes, Note("cells_added", name, len(cells))),
-        cells=tuple(cells),
-    )
+        notes=(*notes, Note("cells_added", name, len(cells))), cells=tuple(cells),
+    )  # fmt: skip
 
 
 def _read_sum(cells: tuple[Signal, ...], start: int, stop: int) -> NDArray[np.float64]:

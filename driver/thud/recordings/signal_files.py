@@ -201,18 +201,10 @@ def _in_newtons(
         if scale < 0:
             notes.append(Note("sign_stated", others={"polarity": config.polarity}))
     return Signal(
-        name=name,
-        path=str(file),
-        sample_rate=rate,
-        n_sample=channel.n_sample,
-        samples=channel.samples,
-        scale=scale,
-        full_scale=abs(scale) if channel.counts else None,
-        date=shown_text(channel.date),
-        calibration=description,
-        calibration_uncertainty=uncertainty,
-        notes=tuple(replace(note, subject=name) for note in notes),
-    )
+        name, str(file), rate, channel.n_sample, channel.samples, scale,
+        abs(scale) if channel.counts else None, shown_text(channel.date), description, uncertainty,
+        tuple(replace(note, subject=name) for note in notes),
+    )  # fmt: skip
 
 
 def _rate(channel: Channel, stated: float | None, name: str) -> tuple[float, list[Note]]:

@@ -61,19 +61,11 @@ def read_channels(path: Path) -> list[Channel]:
     if count < 1 or (is_flac and _read(path, 0, count - 1, count).size != 1):
         refuse(f"{name}: is cut off or has no samples", "a complete file")
     counts = SUBTYPES[kind]
+    unit = "FS" if counts else ""
+    reads = [partial(_read, path, column) for column in range(columns)]
     return [
-        Channel(
-            name="",
-            number=column + 1,
-            n_sample=count,
-            samples=partial(_read, path, column),
-            unit="FS" if counts else "",
-            sample_rate=rate,
-            counts=counts,
-            date=date,
-            may_be_fractions=True,
-        )
-        for column in range(columns)
+        Channel("", i, count, read, unit, rate, counts, date, may_be_fractions=True)
+        for i, read in enumerate(reads, 1)
     ]
 
 

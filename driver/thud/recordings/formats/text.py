@@ -30,19 +30,11 @@ def read_channels(path: Path) -> list[Channel]:
     if time is not None:
         step, notes = uniform_grid(time.to("s"), table.name)[1:]
         rate = agreed_rate(rate, 1 / step, table.name)
+    date = find_word(table.header, DATE)
     return [
-        Channel(
-            name=column.name,
-            number=column.number,
-            n_sample=rows,
-            samples=freeze(column.values),
-            unit=column.unit,
-            sample_rate=rate,
-            date=find_word(table.header, DATE),
-            notes=notes,
-        )
-        for column in table.columns
-        if column is not time
+        Channel(c.name, c.number, rows, freeze(c.values), c.unit, rate, date=date, notes=notes)
+        for c in table.columns
+        if c is not time
     ]
 
 

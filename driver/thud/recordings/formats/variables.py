@@ -137,17 +137,11 @@ def _channel(
     unit = stated or titled or find_word(entries, UNIT)
     if len({find_unit(stated), find_unit(titled)} - {""}) > 1:
         unit = f"{stated} by the attribute, {titled} by the name"
+    title = vector.array + (f"[{vector.column}]" if vector.column else "")
     return Channel(
-        name=vector.array + (f"[{vector.column}]" if vector.column else ""),
-        number=number,
-        n_sample=vector.n_sample,
-        samples=vector.read,
-        unit=unit,
-        sample_rate=rate or find_rate(entries),
-        date=find_word(entries, DATE),
-        notes=notes,
-        unapplied=find_unapplied(entries, unit),
-    )
+        title, number, count, vector.read, unit, rate or find_rate(entries),
+        date=find_word(entries, DATE), notes=notes, unapplied=find_unapplied(entries, unit),
+    )  # fmt: skip
 
 
 def _header_of(vector: Vector, header: Header) -> tuple[Header, Header, Header]:
