@@ -288,8 +288,11 @@ def find_edge(
         # steps that does not reach them, up to the other edge.
         limit = THRESHOLD * background.peak + 1.5 * quantization.step
         later = side * np.flatnonzero(force > limit) / rate
-        rise = later[later > middle].min(initial=side * other / rate) - middle
-        rise *= quantization.offset / quantization.step
+        rise = (
+            quantization.offset
+            / quantization.step
+            * (later[later > middle].min(initial=side * other / rate) - middle)
+        )
     return (
         Estimate(side * mean, math.hypot(deviation, TOUCH_ERRORS[side < 0])),
         Estimate(side * middle, math.hypot(math.sqrt(variance), correction, rise)),
