@@ -200,11 +200,6 @@ def test_useless_records_are_told(tmp_path: Path, text: str, words: str) -> None
     assert "\n" not in str(caught.value)
 
 
-def test_missing_record_is_told(tmp_path: Path) -> None:
-    with pytest.raises(thud.InputError, match=naming("no.csv")):
-        read_table(tmp_path / "no.csv")
-
-
 def test_force_of_the_wrong_sign_is_told() -> None:
     # As a plate gives it that counts pulling positive: the noise before the impact is positive.
     impact = thud.solve(duration=0.03)

@@ -178,6 +178,7 @@ def test_command_states_the_time_constant(
     shown = capsys.readouterr()
     lines = tomllib.loads(shown.out)
     assert float(lines["calibration"].split()[0]) == pytest.approx(FORCE, rel=0.004)
+    assert 0.001 < lines["calibration_uncertainty"] < 0.004
     assert re.search(r"# droop with a time constant of [45]\.\d+ s, standard", shown.out)
     assert not shown.err
     assert cli.main(arguments) == 0

@@ -9,7 +9,7 @@ import pytest
 from conftest import codes, naming, noted
 
 import thud
-from thud.recordings.config import Config, parse_numbers
+from thud.recordings.config import Config
 from thud.recordings.drops import Pulse, find_drops
 from thud.recordings.signal import Signal
 
@@ -179,7 +179,3 @@ def test_impossible_restitution_is_a_warning() -> None:
 def test_impossible_choice_is_refused(choice: dict[str, Any], words: tuple[str, ...]) -> None:
     with pytest.raises(thud.InputError, match=naming(*words)):
         measured(**choice)
-
-
-def test_numbers_are_ranges() -> None:
-    assert [list(r) for r in parse_numbers("1-3, 8", "drops")] == [[1, 2, 3], [8]]
