@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base.checks import require_choice
 from thud.impact.contact_time import MARGIN
 from thud.level.levels import BANDWIDTHS, low_pass
 from thud.plot.impact_figures import TIME_LABEL
@@ -44,13 +43,6 @@ MAX_DISTANCE = 20.0
 THIN: dict[str, Any] = {"color": "0.55", "linewidth": 0.5}
 OTHERS: dict[str, Any] = {"color": COLORS[2], "linewidth": 1.0, "linestyle": (0, (1, 1))}
 DEVIANT: dict[str, Any] = {"color": COLORS[1], "linewidth": 0.7, "linestyle": (0, (3, 1))}
-
-
-@own_style()
-def recording_figure(recording: Recording, quantity: str = "levels") -> Figure:
-    """Draw the ``"levels"`` or the ``"force"`` of a recording."""
-    require_choice("quantity", quantity, ("levels", "force"))
-    return recording_levels(recording) if quantity == "levels" else recording_forces(recording)
 
 
 @own_style()

@@ -130,11 +130,9 @@ def calibrate(  # noqa: PLR0913 - the keys of the configuration
     steps, notes = _measure_steps(signal)
     size, number = float(np.abs(steps.changes).mean()), len(steps.changes)
     if steps.uncertainty > MAX_UNCERTAINTY * size:
-        refuse(
-            f"{signal.name}: the step is {size:.4g} {symbol} with an uncertainty of "
-            f"{steps.uncertainty:.2g} {symbol}",
-            f"an uncertainty up to {MAX_UNCERTAINTY:.0%}",
-        )
+        doubt = f"an uncertainty of {steps.uncertainty:.2g} {symbol}"
+        allowed = f"an uncertainty up to {MAX_UNCERTAINTY:.0%}"
+        refuse(f"{signal.name}: the step of {size:.4g} {symbol} has {doubt}", allowed)
     spread = 0.0
     if (steps.changes[1:] * steps.changes[:-1] > 0).any():
         notes.append(Note("steps_in_one_direction", value=newtons, unit="N"))
@@ -170,10 +168,8 @@ def open_source(
     name = shown_text(path)
     channels = choose_channels(read_channels(path), Config(channel=channel), name)
     if len(channels) != 1:
-        refuse(
-            f"{name}: has {len(channels)} channels of force",
-            f"channel (--channel) = one of {channel_choices(channels)}",
-        )
+        allowed = f"channel (--channel) = one of {channel_choices(channels)}"
+        refuse(f"{name}: has {len(channels)} channels of force", allowed)
     (source,) = channels
     symbol = find_unit(source.unit) if unit is None else require_unit(path.name, unit)
     rate = math.nan if source.sample_rate is None else source.sample_rate
@@ -211,9 +207,7 @@ def _measure_steps(signal: Signal) -> tuple[_Steps, list[Note]]:
     lag = longest if math.isnan(interval) else min(longest, max(1, round(LAG / interval)))
     plateaus = _find_plateaus(level, lag)
     if len(plateaus) < 2 or min(len(plateau) for plateau in plateaus) < MIN_PLATEAU:  # noqa: PLR2004
-        refuse(
-            f"{name}: has no clear step", "a record in which a known force is put on or taken off"
-        )
+        refuse(f"{name}: has no clear step", "a known force that is put on or taken off")
     for side, values in (("maximum", high), ("minimum", -low)):
         _refuse_clipped(signal, values, plateaus, side)
     steps = _fit_steps(level, plateaus)

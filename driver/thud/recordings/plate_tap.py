@@ -171,10 +171,8 @@ def calibrate_tap(
     taps = _find_taps(level / (np.abs(level).max(initial=0.0) or 1.0), rate, name)
     fits = [modes for tap in taps if (modes := _fit_tap(tap, rate))]
     if not fits:
-        refuse(
-            f"{name}: no resonance stands out after {len(taps)} tap{'s' * (len(taps) > 1)}",
-            "a tap of a hard hammer after which the plate rings",
-        )
+        problem = f"{name}: no resonance stands out after {len(taps)} tap{'s' * (len(taps) > 1)}"
+        refuse(problem, "a tap of a hard hammer after which the plate rings")
     fits = [modes for modes in fits if not _misfit(modes)] or fits
     # Weaker taps may show another resonance first.
     strongest = max(itertools.chain(*fits), key=lambda mode: mode.amplitude / mode.frequency)
@@ -187,11 +185,8 @@ def calibrate_tap(
     frequency, u_frequency = _mean([(m.frequency, m.frequency_uncertainty) for m in firsts])
     quality, u_quality = _mean([(m.quality, m.quality_uncertainty) for m in firsts])
     if not u_frequency <= MAX_UNCERTAINTY:
-        refuse(
-            f"{name}: the resonance near {frequency:.4g} Hz is known to {100 * u_frequency:.2g} % "
-            "only",
-            f"an uncertainty up to {MAX_UNCERTAINTY:.0%}",
-        )
+        known = f"the resonance near {frequency:.4g} Hz is known to {100 * u_frequency:.2g} %"
+        refuse(f"{name}: {known} only", f"an uncertainty up to {MAX_UNCERTAINTY:.0%}")
     misfit, others = _misfit(firsts), [m for m in max(fits, key=len) if shift(m) >= SAME]
     return TappedPlate(
         frequency, quality, math.hypot(u_frequency, CLOCK), u_quality, len(firsts),
@@ -224,11 +219,8 @@ def _find_taps(level: NDArray[np.float64], rate: float, name: str) -> list[Tap]:
         refuse(f"{name}: no tap", "a record in which a hammer taps the plate")
     tops = peaks[found["widths"] <= CONTACT * rate] - 1
     if not tops.size:
-        refuse(
-            f"{name}: no tap, but the plate is pressed for more than {1e3 * CONTACT:g} ms, as by a "
-            "drop",
-            "a record in which a hard hammer taps the plate",
-        )
+        problem = f"the plate is pressed for more than {1e3 * CONTACT:g} ms, as by a drop"
+        refuse(f"{name}: no tap, but {problem}", "a record in which a hard hammer taps the plate")
     contact, before, after = (round(length * rate) for length in (CONTACT, BEFORE, AFTER))
     ends = [*(tops[1:] - contact), len(level)]
     # The second half of what lies between two taps is quiet.

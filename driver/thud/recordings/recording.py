@@ -274,9 +274,10 @@ class Recording(ImpactOrRecording):
 
     def plot(self, kind: Literal["levels", "force"] = "levels") -> Figure:
         """Draw the levels of the drops over the tolerance band, or their forces."""
-        from thud.plot.recording_figures import recording_figure
+        from thud.plot.recording_figures import recording_forces, recording_levels
 
-        return recording_figure(self, kind)
+        require_choice("kind", kind, ("levels", "force"))
+        return recording_levels(self) if kind == "levels" else recording_forces(self)
 
     def to_xarray(self) -> xr.Dataset:
         """Return the force of the first drop, the average levels and the means over the drops.

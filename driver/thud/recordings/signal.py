@@ -118,10 +118,8 @@ class Signal(Immutable):
         force = values(start, stop) if callable(values) else values[start:stop]
         force = force * self.scale
         if force.shape != (stop - start,):
-            refuse(
-                f"{self.name}: {force.size} samples from sample {start}, {stop - start} expected",
-                "a file that is complete and does not change",
-            )
+            problem = f"{force.size} samples from sample {start}, {stop - start} expected"
+            refuse(f"{self.name}: {problem}", "a file that is complete and does not change")
         if not np.isfinite(force).all():
             index = start + int(np.flatnonzero(~np.isfinite(force))[0])
             refuse(f"{self.name}: sample {index + 1} is not finite", "real numbers")
@@ -188,11 +186,9 @@ def orient(signal: Signal, polarity: str | None = None) -> Signal:
     notes: list[Note] = []
     up, down = find_peaks(signal)
     if not polarity and max(up, down) < MIN_PEAK_RATIO * min(up, down):
-        refuse(
-            f"{signal.name}: the sign is not clear, the peaks are {up:.4g} N and {-down:.4g} N",
-            "polarity = 'positive' or 'negative', the sign of a compression",
-            subject="polarity",
-        )
+        problem = f"the sign is not clear, the peaks are {up:.4g} N and {-down:.4g} N"
+        allowed = "polarity = 'positive' or 'negative', the sign of a compression"
+        refuse(f"{signal.name}: {problem}", allowed, subject="polarity")
     if not polarity and down > up:
         notes.append(Note("sign_changed", signal.name, -down, unit="N"))
         cells = tuple(replace(cell, scale=-cell.scale) for cell in signal.cells)
@@ -225,10 +221,8 @@ def check_peak(peak: float, opposite: float, name: str, *, assumed: bool = False
         if not low / MAX_FACTOR <= peak <= high * MAX_FACTOR:
             fitting = [unit for unit, size in WRONG_UNITS.items() if low <= peak * size <= high]
             mends = [f"unit = {unit!r}" for unit in fitting] + ["a calibration"]
-            refuse(
-                f"{name}: the peak is {peak:.4g} N; unit or calibration is wrong",
-                f"{allowed}; {', or '.join(mends)}",
-            )
+            problem = f"{name}: the peak is {peak:.4g} N; unit or calibration is wrong"
+            refuse(problem, f"{allowed}; {', or '.join(mends)}")
         notes.append(Note("peak_unusual", name, peak, low, high, "N"))
     if opposite > MIN_PEAK_RATIO * peak:
         others = {"opposite": -opposite}

@@ -66,11 +66,9 @@ def open_signals(
     stated = config.calibration
     calibrations = stated if isinstance(stated, tuple) else (stated,) * len(chosen)
     if len(calibrations) != len(chosen):
-        refuse(
-            f"{shown_text(file)}: {len(calibrations)} calibrations for {len(chosen)} "
-            f"channel{'s' * (len(chosen) > 1)}",
-            "one calibration, or one for each entry of channels",
-        )
+        channel_count = f"{len(chosen)} channel{'s' * (len(chosen) > 1)}"
+        problem = f"{shown_text(file)}: {len(calibrations)} calibrations for {channel_count}"
+        refuse(problem, "one calibration, or one for each entry of channels")
     name = shown_text(file.name)
     names = [f"{name}, {entry.title}" if len(channels) > 1 else name for entry in chosen]
     try:
@@ -150,11 +148,8 @@ def _find_channel(channels: list[Channel], channel: int | str, name: str) -> Cha
         if title in {str(entry.number), own, own.rpartition("/")[2]}:
             matching.append(entry)
     if len(matching) != 1:
-        refuse(
-            f"{name}: channel = {shown(channel)} matches {len(matching)} channels",
-            f"one of {channel_choices(channels)}",
-            subject="channel",
-        )
+        problem = f"{name}: channel = {shown(channel)} matches {len(matching)} channels"
+        refuse(problem, f"one of {channel_choices(channels)}", subject="channel")
     return matching[0]
 
 
@@ -211,11 +206,8 @@ def _rate(channel: Channel, stated: float | None, name: str) -> tuple[float, lis
     """Return the sample rate of a channel, Hz: stated, or of the file."""
     rate = channel.sample_rate if stated is None else stated
     if rate is None:
-        refuse(
-            f"{name}: the sample rate is not known",
-            "sample_rate in Hz, or a column of times in s",
-            subject="sample_rate",
-        )
+        allowed = "sample_rate in Hz, or a column of times in s"
+        refuse(f"{name}: the sample rate is not known", allowed, subject="sample_rate")
     if not RATES[0] <= rate <= RATES[1]:
         refuse(f"{name}: the sample rate is {rate:.6g} Hz", f"{RATES[0]:g} to {RATES[1]:g} Hz")
     if channel.sample_rate in {None, rate}:

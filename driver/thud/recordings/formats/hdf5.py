@@ -11,13 +11,7 @@ import numpy as np
 from thud.base.checks import refuse, shown_text
 from thud.base.extras import library
 from thud.recordings.formats import Channel, guarded
-from thud.recordings.formats.variables import (
-    Header,
-    Vector,
-    channels_of_vectors,
-    header_entry,
-    vectors_of,
-)
+from thud.recordings.formats.variables import Header, Vector, channels_of, header_entry, vectors_of
 
 if TYPE_CHECKING:
     from collections.abc import Collection
@@ -80,7 +74,7 @@ def read_channels(path: Path) -> list[Channel]:
     with h5py.File(os.fsencode(path), "r", locking=LOCKING) as file:
         visit("", file)
         file.visititems(visit)
-        return channels_of_vectors(vectors, header, name)
+        return channels_of(vectors, header, name)
 
 
 def _scaling(dataset: Any) -> dict[str, float]:  # noqa: ANN401 - of the library

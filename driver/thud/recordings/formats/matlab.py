@@ -11,12 +11,7 @@ import scipy.io
 
 from thud.base.checks import refuse, shown_text
 from thud.base.files import MAX_IN_MEMORY, MIB, require_small
-from thud.recordings.formats.variables import (
-    Vector,
-    channels_of_vectors,
-    header_entry,
-    vectors_of,
-)
+from thud.recordings.formats.variables import Vector, channels_of, header_entry, vectors_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -44,7 +39,7 @@ def read_channels(path: Path) -> list[Channel]:
             found = vectors_of(key, value.dtype.kind, value.shape, value.__getitem__)
             vectors += found
             header += [] if found else [header_entry(key, value)]
-    return channels_of_vectors(vectors, header, name)
+    return channels_of(vectors, header, name)
 
 
 def _arrays(key: str, content: object, name: str) -> Iterator[tuple[str, NDArray[np.generic]]]:

@@ -100,7 +100,7 @@ def header_entry(key: str, value: object) -> tuple[str, str]:
     return key, text_of(value)
 
 
-def channels_of_vectors(vectors: list[Vector], header: Header, name: str) -> list[Channel]:
+def channels_of(vectors: list[Vector], header: Header, name: str) -> list[Channel]:
     """Return the channels among vectors: all but those of times.
 
     The header holds scalars, texts and attributes by their names. An entry applies to its owner,
