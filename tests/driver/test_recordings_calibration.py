@@ -411,31 +411,17 @@ def test_second_resonance_is_stated() -> None:
 @pytest.mark.parametrize(
     ("level", "rate", "words"),
     [
-        (np.zeros(20_000), 20_000.0, naming("recording", "no tap")),
-        (np.zeros(0), 20_000.0, naming("recording", "empty")),
-        (np.random.default_rng(1).normal(size=20_000), 20_000.0, naming("recording", "no tap")),
+        (np.zeros(20_000), 2e4, naming("recording", "no tap")),
+        (np.zeros(0), 2e4, naming("recording", "empty")),
+        (noisy(np.zeros(20_000), 1.0), 2e4, naming("recording", "no tap")),
         (np.zeros(20_000), 1000.0, naming("sample rate", "2000 Hz")),
-        (
-            np.repeat([0.0, 1.0], [9_990, 10_010])
-            + np.random.default_rng(1).normal(0, 0.01, 20_000),
-            20_000.0,
-            naming("recording", "no tap", "pressed"),
-        ),
-        (
-            half_sine(20_000.0, 0.2, 20_000, 1.0, 0.001)
-            + np.random.default_rng(1).normal(0, 0.01, 20_000),
-            20_000.0,
-            naming("recording", "no resonance"),
-        ),
+        (noisy(np.repeat([0.0, 1.0], [9_990, 10_010]), 0.01), 2e4, naming("no tap", "pressed")),
+        (noisy(half_sine(2e4, 0.2, 20_000, 1.0, 0.001), 0.01), 2e4, naming("no resonance")),
         # A ball and its bounce.
-        (
-            sum(half_sine(20_000.0, begin, 30_000, 1500.0, 0.02) for begin in (0.2, 0.9))
-            + np.random.default_rng(1).normal(0, 1.0, 30_000),
-            20_000.0,
-            naming("recording", "no tap", "drop"),
-        ),
+        (noisy(sum(half_sine(2e4, t, 30_000, 1500.0, 0.02) for t in (0.2, 0.9)), 1.0), 2e4,
+         naming("no tap", "drop")),
     ],
-)
+)  # fmt: skip
 def test_records_without_a_resonance(level: NDArray[np.float64], rate: float, words: str) -> None:
     with pytest.raises(InputError, match=words):
         calibrate_tap(Signal.from_array(level, rate))
