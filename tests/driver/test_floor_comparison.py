@@ -16,7 +16,7 @@ import thud
 from thud.base.bridge import ask
 from thud.case.case import case_text
 from thud.cli import main
-from thud.floors.prediction import rating_title
+from thud.floors.description import rating_title
 from thud.floors.tapping import FREQUENCY
 from thud.level.rating import class_text
 

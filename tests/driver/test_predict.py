@@ -21,8 +21,7 @@ from test_figure_look import assert_clean
 import thud
 from thud import cli
 from thud.base.tables import unmarked
-from thud.floors.description import CONTRIBUTIONS, verdict_text
-from thud.floors.prediction import rating_title
+from thud.floors.description import CONTRIBUTIONS, rating_title, verdict_text
 from thud.floors.resonances import floor_frequencies, resonances, room_frequencies
 from thud.plot.room_figures import draw_levels
 from thud.report.floor_files import contents, page_contents, screen_text

@@ -11,8 +11,14 @@ from thud.case.keys import humanize
 from thud.explorer.criteria import RESULTS
 from thud.explorer.models import MODEL_FACTS
 from thud.explorer.series import curve, to_json
-from thud.floors.description import CAVEAT, CONTRIBUTIONS, case_layers, verdict_text
-from thud.floors.prediction import rating_title, source_note
+from thud.floors.description import (
+    CAVEAT,
+    CONTRIBUTIONS,
+    case_layers,
+    rating_title,
+    source_note,
+    verdict_text,
+)  # fmt: skip
 from thud.impact.contact_time import contact_force
 from thud.level.rating import class_text
 

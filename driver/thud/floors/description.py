@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from thud.base._schema import (
+    RATINGS,
     JoistFloor,
     LaminateFloor,
     MeasuredMobility,
@@ -13,12 +14,11 @@ from thud.base._schema import (
     RectangularFloor,
 )
 from thud.case.constructions import Layer
-from thud.floors.prediction import source_note
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from thud.base._schema import FloorOptions, Room
+    from thud.base._schema import FloorOptions, Room, RoomRating
     from thud.floors.prediction import RoomPrediction
 
 
@@ -48,6 +48,22 @@ _GRAVEL_DENSITY = 1500.0
 # Thicknesses of the layers of a laminate by default, m.
 _LAMELLAS = (0.04, 0.02, 0.04, 0.02, 0.04)
 _ASSUMED = "(thickness assumed)"
+
+
+def rating_title(prediction: RoomPrediction, name: RoomRating) -> str:
+    """Return the title of a rating, with its standard if the source is the ball."""
+    return RATINGS[name] if prediction.is_ball else f"A-weighted level ({name})"
+
+
+def source_note(prediction: RoomPrediction) -> str:
+    """Return the note that belongs beside each rating by a source that does not conform."""
+    return "the source does not conform" if prediction.source_notes else ""
+
+
+def rating_text(prediction: RoomPrediction) -> str:
+    """Return the rating, the probability to meet a requirement, and the note on the source."""
+    words = str(prediction.requirement or prediction.rating)
+    return ", ".join(filter(None, (words, source_note(prediction))))
 
 
 def remedy(prediction: RoomPrediction) -> str:

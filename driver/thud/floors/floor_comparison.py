@@ -17,13 +17,8 @@ from thud.base.files import Results
 from thud.base.tables import Result
 from thud.case.case import Case
 from thud.case.constructions import Construction, with_floor
-from thud.floors.prediction import (
-    RoomPrediction,
-    predict_level,
-    rating_text,
-    rating_title,
-    source_note,
-)
+from thud.floors.description import rating_text, rating_title, source_note
+from thud.floors.prediction import RoomPrediction, predict_level
 from thud.floors.tapping import has_tapping_level, tapping_level
 from thud.impact.compute import compute
 from thud.level.rating import class_text

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from thud.base._schema import LIMITS, RATINGS, VERDICTS, Room
+from thud.base._schema import LIMITS, VERDICTS, Room
 from thud.base.bridge import ask
 from thud.base.checks import refuse, require_kind
 from thud.base.display import Tabulated
 from thud.base.note import Note
 from thud.case.case import Case, case_text
 from thud.case.constructions import Construction, with_floor
+from thud.floors.description import rating_text, rating_title
 from thud.floors.survey import RoomLevels
 from thud.impact.compute import compute, new_floor_impact, new_room_level
 from thud.impact.floor_impact import FloorImpact
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from thud.base._schema import FloorOptions, RoomRating
+    from thud.base._schema import FloorOptions
     from thud.base.display import Columns
     from thud.recordings.recording import ImpactResult
 
@@ -178,22 +179,6 @@ class RoomPrediction(RoomLevel, Tabulated):
         """Return rating, requirement and what is wrong with the source."""
         title = rating_title(self, self.room.rating)
         return f"<RoomPrediction: {title} {rating_text(self)}>"
-
-
-def rating_title(prediction: RoomPrediction, name: RoomRating) -> str:
-    """Return the title of a rating, with its standard if the source is the ball."""
-    return RATINGS[name] if prediction.is_ball else f"A-weighted level ({name})"
-
-
-def source_note(prediction: RoomPrediction) -> str:
-    """Return the note that belongs beside each rating by a source that does not conform."""
-    return "the source does not conform" if prediction.source_notes else ""
-
-
-def rating_text(prediction: RoomPrediction) -> str:
-    """Return the rating, the probability to meet a requirement, and the note on the source."""
-    words = str(prediction.requirement or prediction.rating)
-    return ", ".join(filter(None, (words, source_note(prediction))))
 
 
 def predict_level(

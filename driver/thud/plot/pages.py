@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.floors.prediction import rating_title
+from thud.floors.description import rating_title
 from thud.impact.contact_time import contact_force
 from thud.level.assessment import octave_limits
 from thud.level.levels import get_bands
@@ -123,7 +123,7 @@ def comparison_figure(
     draw_levels(panels, impacts, force, source)
     _, name = assessed_curves(impacts, force)
     for axes in panels.values():
-        axes.set_ylabel(level_label(name, LEVEL.replace(" level", "\nlevel")))
+        axes.set_ylabel(level_label(name, LEVEL.replace(", ", ",\n", 1)))
     figure.align_ylabels()
     legend_above(octaves)
     return figure

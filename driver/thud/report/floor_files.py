@@ -11,8 +11,7 @@ from thud.base._schema import RATED_BANDS
 from thud.base.bridge import version
 from thud.base.display import draw_all
 from thud.base.tables import csv_text, marked
-from thud.floors.description import CAVEAT, verdict_text
-from thud.floors.prediction import source_note
+from thud.floors.description import CAVEAT, source_note, verdict_text
 from thud.report.predicted_floor import tables
 
 if TYPE_CHECKING:

@@ -19,12 +19,8 @@ from thud.base._schema import (
 from thud.base.errors import ThudError
 from thud.base.units import display_unit
 from thud.case.keys import humanize
-from thud.floors.description import CONTRIBUTIONS, case_layers, verdict_text
-from thud.floors.prediction import (
-    BANDS,
-    predict_level,
-    rating_title,
-)
+from thud.floors.description import CONTRIBUTIONS, case_layers, rating_title, verdict_text
+from thud.floors.prediction import BANDS, predict_level
 from thud.floors.resonances import floor_frequencies, resonances, room_frequencies
 from thud.level.levels import get_bands
 from thud.level.rating import class_text
