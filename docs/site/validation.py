@@ -119,7 +119,7 @@ def draw_codes(curves: dict[str, Any]) -> Figure:
     change.set_xticks(place, [f"{octave:g}" for octave in octaves])
     change.set_xlabel("Octave band, Hz")
     change.set_ylabel("thud − other\ncode, dB")
-    levels.set_ylabel(LEVEL.replace(", ", ",\n"))
+    levels.set_ylabel(LEVEL.replace(", ", ",\n", 1))
     figure.align_ylabels()
     legend_above(levels)
     return figure

@@ -52,7 +52,7 @@ def test_force_history_shows_every_curve_with_units() -> None:
 def test_levels_show_the_tolerance_band(shell: thud.Impact, source: str) -> None:
     (axes,) = thud.plot.levels({"ball": shell}, source=source).axes
     assert axes.get_xlabel().endswith(", Hz")
-    assert axes.get_ylabel() == "Force exposure level, dB re 1 N\n(force on the floor)"
+    assert axes.get_ylabel() == "Force exposure level, dB re 1 N, 1 s\n(force on the floor)"
     boxes = [box.get_datalim(axes.transData).intervaly for box in axes.collections[:5]]
     limits = [(c.lower, c.upper) for c in shell.assess(source).criteria[:5]]
     np.testing.assert_allclose(boxes, limits)

@@ -90,7 +90,7 @@ def levels(
     Returns
     -------
     Figure
-        Bands in Hz, force exposure level in dB re 1 N.
+        Bands in Hz, force exposure level in dB re 1 N, 1 s.
     """
     curves, _ = assessed_curves(impacts, force)
     requested = {impact.case.levels.bands for impact, _ in curves.values()}

@@ -120,4 +120,4 @@ def _draw_levels(axes: Axes, levels: DropLevels) -> None:
     )  # fmt: skip
     draw_background(axes, levels.background.max(axis=0), levels.level)
     band_axis(axes, levels.bands)
-    axes.set_ylabel(LEVEL.replace(", ", ",\n"))
+    axes.set_ylabel(LEVEL.replace(", ", ",\n", 1))

@@ -48,7 +48,7 @@ ERROR_BARS: dict[str, Any] = {
 WIDTH = 8 / 2.54
 FORCE_NAMES = {"elastic": "elastic force", "floor": "force on the floor"}
 BAND_NAMES = {"octave": "Octave band", "third": "One-third-octave band"}
-LEVEL = "Force exposure level, dB re 1 N"
+LEVEL = "Force exposure level, dB re 1 N, 1 s"
 FAST_LEVEL = "Maximum Fast level,\ndB re 20 µPa"
 RATING_SYMBOL = r"$L_\mathrm{iA,Fmax}$"
 # Maximum number of characters in a line of a legend.
