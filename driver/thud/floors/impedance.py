@@ -12,7 +12,7 @@ from thud.base._schema import BandSet, InfinitePlate
 from thud.base.bridge import ask
 from thud.base.checks import refuse, refuse_value, require_array, require_kind
 from thud.base.display import Tabulated
-from thud.case.case import Case, case_text, impact_only
+from thud.case.case import case_text, impact_only
 from thud.impact.compute import new_floor_impact
 from thud.impact.impact import Impact
 from thud.level.levels import force_exposure_levels, get_bands
@@ -46,8 +46,6 @@ class BallImpedance(Tabulated):
 
     Attributes
     ----------
-    case : Case
-        Case of the impact.
     bands : str
         ``"octave"`` or ``"third"``.
     frequency : ndarray, shape (n_band,)
@@ -60,7 +58,6 @@ class BallImpedance(Tabulated):
         Complex impedance from the force on each floor, N s/m.
     """
 
-    case: Case
     bands: BandSet
     frequency: Array
     resistance: Array
@@ -165,7 +162,6 @@ def ball_impedance(
         pairs = zip(spectrum, _band_spectra(force, source.sample_rate, bands), strict=True)
         estimates.append([value * np.vdot(f, fb - f) / np.vdot(f, f) for fb, f in pairs])
     return BallImpedance(
-        case=source.case,
         bands=bands,
         frequency=edges.nominal,
         resistance=np.array(floors, dtype=np.float64),

@@ -93,11 +93,6 @@ class Mobility(Tabulated):
         return np.asarray(np.interp(frequencies, known, self.values[order]))
 
     @property
-    def is_passive(self) -> bool:
-        """Whether no real part is negative: the floor takes energy at all frequencies."""
-        return bool((self.values.real >= 0).all())
-
-    @property
     def notes(self) -> tuple[Note, ...]:
         """Warnings on a measurement: mobilities that no floor has, and negative real parts."""
         used = np.abs(self.values[self.values != 0])
@@ -107,8 +102,7 @@ class Mobility(Tabulated):
         if not low <= (mean := float(np.exp(np.mean(np.log(used))))) <= high:
             note = Note("mobility_implausible", value=mean, low=low, high=high, unit="m/(N s)")
             result.append(note)
-        if not self.is_passive:
-            negative = 100 * float(np.mean(self.values.real < 0))
+        if negative := 100 * float(np.mean(self.values.real < 0)):
             result.append(Note("real_part_negative", value=negative, unit="%"))
         return tuple(result)
 

@@ -207,12 +207,9 @@ class RoomLevels(Tabulated):
         """Return the single-number ratings."""
         standardized = self.standardized_rating
         suffix = "" if standardized is None else f", standardized {standardized.rounded} dB"
-        return f"<RoomLevels, {self._count}: L_iA,Fmax {self.rating.rounded} dB{suffix}>"
-
-    @property
-    def _count(self) -> str:
         count = len(self.positions)
-        return f"{count} position{'s' if count > 1 else ''}"
+        positions = f"{count} position{'s' * (count > 1)}"
+        return f"<RoomLevels, {positions}: L_iA,Fmax {self.rating.rounded} dB{suffix}>"
 
     @property
     def _rated(self) -> NDArray[np.bool_]:
