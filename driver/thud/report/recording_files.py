@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from thud.base._schema import VERDICTS
 from thud.base.bridge import version
 from thud.base.checks import refuse, require_kind, shown_text
-from thud.base.display import draw_all
+from thud.base.display import draw_all, warn_if_not_drawn
 from thud.base.errors import ReportWarning
 from thud.base.files import Results, read_input
 from thud.base.tables import csv_text, marked
@@ -144,7 +144,7 @@ def save(
         CRITERIA: criteria_csv(data).encode(),
         JSON: json_bytes(data),
     }
-    if figures:
+    if figures and _can_draw():
         drawings = draw_figures(recording)
         contents |= page_contents(recording, data, drawings, folder) | drawings
     if stages:
@@ -157,6 +157,15 @@ def save(
         message = f"{folder}: replaces the results of another recording"
         warnings.warn(message, ReportWarning, stacklevel=3)
     return paths
+
+
+def _can_draw() -> bool:
+    """Whether matplotlib can be imported; warn if it is damaged, as levels do not depend on it."""
+    with warn_if_not_drawn(HTML):
+        import thud.plot  # noqa: F401 - slow
+
+        return True
+    return False
 
 
 def draw_figures(recording: Recording) -> dict[str, bytes]:
