@@ -220,7 +220,7 @@ def test_command_writes_the_page(
     assert cli.main(["compare", str(STEPS[0]), "plate.csv"]) == 0
     output = capsys.readouterr().out
     assert "1_shell" in output
-    assert "Page: outputs/comparison/comparison.html" in output
+    assert "Results: outputs/comparison" in output
     assert (tmp_path / "outputs/comparison/comparison.html").stat().st_size < 1e6
     assert "nowhere.nml" in errors_of("compare", "-q", "nowhere.nml")
     assert "--output" in errors_of("compare", "-q", "-o", "", STEPS[0])
