@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import copy
 import json
 import re
 from dataclasses import replace
@@ -76,6 +75,13 @@ def report(day: str, levels: Any = LEVELS, deviation: float = 0.1, **keys: Any) 
         "format": FORMAT, "ball": "ball", "serial": "7", "source": "rubber_ball", "date": day,
         "verdict": VERDICTS[0], "criteria": rows, **keys,
     }  # fmt: skip
+
+
+def broken(key: str, value: object) -> list[dict[str, Any]]:
+    """Return the criteria of a report with a wrong entry."""
+    rows: list[dict[str, Any]] = report("2030-01-01")["criteria"]
+    rows[2][key] = value
+    return rows
 
 
 def history(slope: float = 0.0, count: int = 6, seed: int | None = None) -> History:
@@ -304,18 +310,14 @@ def test_reports_are_in_the_order_of_their_dates(folder: Path) -> None:
     assert rows[1][-1].endswith(" significant")
 
 
-def test_table_of_many_reports_is_not_wide() -> None:
-    head = history(count=30).table()[0]
-    assert len(head) == 10
-    assert head[1] == "2015-01-01"
-    assert head[-2] == history(count=30).dates[-1].date().isoformat()
-
-
-def test_table_of_one_report_has_no_trend() -> None:
+def test_table_of_many_reports_is_not_wide_and_of_one_has_no_trend() -> None:
+    many = history(count=30)
+    head = many.table()[0]
+    assert (len(head), head[1]) == (10, "2015-01-01")
+    assert head[-2] == many.dates[-1].date().isoformat()
     head, *rows = history(slope=0.1, count=1).table()
     assert head == ("", "2015-01-01", "per year")
-    assert rows[1] == ("63 Hz, dB", "31.00", "–")
-    assert len(rows) == 12
+    assert (len(rows), rows[1]) == (12, ("63 Hz, dB", "31.00", "–"))
 
 
 def test_command_writes_the_chart(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -348,24 +350,17 @@ def test_command_writes_the_chart(folder: Path, capsys: pytest.CaptureFixture[st
         ({"criteria": []}, naming("z/report.json", "version")),
         ({"criteria": [3]}, naming("z/report.json", "version")),
         ({"instruments": None}, naming("z/report.json", "version")),
+        *(({"criteria": broken(*entry)}, naming("z/report.json", "version")) for entry in (
+            ("value", "3"), ("lower", None), ("verdict", "good"), ("upper", True),
+        )),
     ],
-)
+)  # fmt: skip
 def test_reports_that_do_not_belong_are_refused(
     folder: Path, change: dict[str, Any], words: str
 ) -> None:
     save(folder / "z" / "report.json", {**report("2030-01-01"), **change})
     with pytest.raises(thud.InputError, match=words):
         read_history([folder])
-
-
-def test_broken_entries_are_refused(folder: Path) -> None:
-    whole = report("2030-01-01")
-    for key, value in (("value", "3"), ("lower", None), ("verdict", "good"), ("upper", True)):
-        broken = copy.deepcopy(whole)
-        broken["criteria"][2][key] = value
-        path = save(folder / "broken.json", broken)
-        with pytest.raises(thud.InputError, match=naming("broken.json", "version")):
-            read_history([folder, path])
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "[" * 100_000, "\x00", '{"format": 1e999}'])
