@@ -92,12 +92,6 @@ def many(one: Recording, count: int, **config: Any) -> Recording:  # noqa: ANN40
     return Recording("many", tuple(drops), tuple(origins), replace(LAB, **config), 0.01)
 
 
-def test_page_lists_the_requirements_that_the_plate_meets(one: Recording) -> None:
-    plate = Plate(full_scale=6000.0)
-    stated = replace(one, config=replace(LAB, plate=plate))
-    assert "the plate reads up to 6000 N" in words_of(stated)
-
-
 def test_page_says_that_the_background_does_not_count(one: Recording) -> None:
     (drop,) = one.drops
     first, stop = drop.gate
@@ -286,38 +280,11 @@ def test_texts_do_not_overlap_and_stay_on_the_page(written: tuple[Recording, Pat
             assert across < 1 or up < 1.5
 
 
-def test_pictures_have_ink_in_every_part(written: tuple[Recording, Path]) -> None:
-    _, folder = written
-    pictures = []
-    for path in (folder / "report.pdf", print_page(folder)):
-        image = open_pdf(path)[0].render(scale=1).to_pil().convert("L")
-        image.save(folder / f"{path.stem}.png")
-        pictures.append(np.asarray(image) < 128)
-    for ink in pictures:
-        height, width = ink.shape
-        assert (width, height) == pytest.approx((595, 842), abs=2)
-        used = np.flatnonzero(ink.any(axis=1))
-        assert used[0] > 15
-        assert height - used[-1] > 15
-        # No gap of the text, above the number of the page, is larger than 12 mm.
-        used = used[used < height - 40]
-        assert np.diff(used).max() < 12 * 72 / 25.4 + 20
-    # Both engines draw the same: the same share of ink, within their smoothing of letters.
-    assert pictures[0].mean() == pytest.approx(pictures[1].mean(), rel=0.25)
-
-
-def test_page_refers_to_nothing_outside(written: tuple[Recording, Path]) -> None:
+def test_page_refers_to_nothing_outside_and_is_small(written: tuple[Recording, Path]) -> None:
     page = (written[1] / "report.html").read_text()
-    assert "http" not in page
-    assert "@import" not in page
-    assert "<link" not in page
-    assert "<script" not in page
+    assert not re.findall("http|@import|<link|<script|url[(]", page)
     assert {*re.findall(r"""\b(?:src|href)\s*=\s*["'](.{5})""", page)} == {"data:"}
-    assert "url(" not in page
-
-
-def test_page_is_small(written: tuple[Recording, Path]) -> None:
-    assert (written[1] / "report.html").stat().st_size < 400_000
+    assert len(page.encode()) < 400_000
 
 
 def test_data_are_those_of_the_recording(written: tuple[Recording, Path]) -> None:
@@ -388,17 +355,10 @@ def test_names_are_no_code(one: Recording, tmp_path: Path) -> None:
 def test_what_is_not_known_is_said(one: Recording, tmp_path: Path) -> None:
     write_report(unknown(one), tmp_path)
     words = text_of(tmp_path / "report.pdf")
-    for name in (
-        "Laboratory",
-        "Ball",
-        "Serial number",
-        "Measured on",
-        "Temperature",
-        "Instruments",
-    ):
-        assert f"{name} not known" in words
-    for name in ("Restitution", "Mass, kg", "Drop height, m"):
-        assert f"{name} not known – " in words
+    lines = ("Laboratory", "Ball", "Serial number", "Measured on", "Temperature", "Instruments")
+    rows = ("Restitution", "Mass, kg", "Drop height, m")
+    for text in (*(f"{n} not known" for n in lines), *(f"{n} not known – " for n in rows)):
+        assert text in words
     assert "uncertainty not stated" in words
     assert not re.search(r"\bnan\b|\bNone\b|\binf\b", words)
 
@@ -430,16 +390,12 @@ def test_without_weasyprint_there_is_a_page_and_a_sentence(
 def test_missing_font_is_told(
     one: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("matplotlib.font_manager.findSystemFonts", list)
+    monkeypatch.setattr(font_manager, "findSystemFonts", list)
     recording = replace(one, config=replace(LAB, laboratory="建材 lab"))
     with pytest.warns(ReportWarning, match=naming("font", "建材")):
         write_report(recording, tmp_path)
     assert not missing_characters("µ − ± ≤ Ω ° … Институт Ελλάς Šč")
-
-
-def test_characters_of_any_installed_font_are_not_missing(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    # Those of any installed font are not missing.
     installed = [font_manager.findfont("DejaVu Sans")]
     monkeypatch.setattr(font_manager, "findSystemFonts", lambda: installed)
     assert missing_characters("a 建") == "建"
@@ -671,13 +627,12 @@ def test_budgets_combine_to_the_uncertainty(one: Recording, tmp_path: Path) -> N
     assert "Mass: 2.5000 ± 0.0039 kg; u = 0.0020 kg; degrees of freedom ∞; k = 1.96" in words
 
 
-def test_degrees_of_freedom_give_the_coverage_factor_again() -> None:
+def test_degrees_of_freedom_and_risks_are_bounds_where_they_round() -> None:
     for freedom in (1.0, 1.2345, 1.9876, 2.71828, 4.0, 8.4999, 17.777, 234.56):
         k = stdtrit(freedom, 0.975)
         assert stdtrit(float(freedom_text(freedom)), 0.975) == pytest.approx(k, abs=0.01)
-    assert freedom_text(4.0) == "4"
-    assert freedom_text(4.567) == "4.567"
     assert (freedom_text(2000.0), freedom_text(None)) == ("> 1000", "∞")
+    assert [risk_text(p) for p in (0.0, 4e-4, 6e-4)] == ["> 99.9 %", "> 99.9 %", "99.9 %"]
 
 
 def excluded(recording: Recording) -> dict[str, list[str]]:
@@ -721,13 +676,6 @@ def test_complete_uncertainties_are_not_marked(one: Recording, tmp_path: Path) -
     assert excluded(many(one, 5, plate=plate))["octave_500"] == ["resonance of the plate"]
 
 
-def test_table_names_the_measurand_and_its_reference(one: Recording) -> None:
-    words = words_of(one)
-    # The index is in an element of its own.
-    assert "Verdict Force exposure level L FE , dB re 1 N, 1 s 31.5 Hz, dB" in words
-    assert "the repeatability in the budgets is that of the mean energy" in words
-
-
 def test_rectangular_distributions_have_their_half_width_and_divisor() -> None:
     folder = REPOSITORY / "inputs/recordings"
     drops = read_recording(folder / "three_drops.flac", config=read_config(folder / "lab.toml"))
@@ -741,27 +689,26 @@ def test_rectangular_distributions_have_their_half_width_and_divisor() -> None:
         assert product == pytest.approx(part["uncertainty"])
 
 
-def test_risk_that_rounds_to_certainty_is_a_bound() -> None:
-    assert [risk_text(p) for p in (0.0, 4e-4, 6e-4)] == ["> 99.9 %", "> 99.9 %", "99.9 %"]
-
-
-def test_rules_and_standards_are_named(one: Recording) -> None:
-    words = words_of(one)
-    for text in (
-        "guard bands w = U (ILAC-G8:09/2019", "JCGM 106:2012", "JIS A 1418-2:2019",
-        "ISO 10140-5:2021 (table F.1)", "ISO 16283-2:2020", "published transcription",
-        "more than 10 % of its greatest value", "probability of a false acceptance",
-    ):  # fmt: skip
-        assert text in words
-
-
-def test_outliers_are_on_the_page_as_on_the_screen(one: Recording) -> None:
-    recording = many(one, 60)
+@pytest.mark.parametrize(
+    ("config", "words"),
+    [
+        # The index of L_FE is in an element of its own.
+        (LAB, ("Verdict Force exposure level L FE , dB re 1 N, 1 s 31.5 Hz, dB",
+               "the repeatability in the budgets is that of the mean energy",
+               "guard bands w = U (ILAC-G8:09/2019", "JCGM 106:2012", "JIS A 1418-2:2019",
+               "ISO 10140-5:2021 (table F.1)", "ISO 16283-2:2020", "published transcription",
+               "more than 10 % of its greatest value", "probability of a false acceptance",
+               "1 outlier (Grubbs, 5 %), marked but not excluded")),
+        (replace(LAB, plate=Plate(full_scale=6000.0)), ("the plate reads up to 6000 N",)),
+    ],
+)  # fmt: skip
+def test_page_names_measurand_rules_standards_plate_and_outliers(
+    one: Recording, config: Config, words: tuple[str, ...]
+) -> None:
+    recording = replace(many(one, 60), config=config)
     assert recording.outliers
-    words = words_of(recording)
-    for outlier in recording.outliers:
-        assert str(outlier) in words
-    assert "1 outlier (Grubbs, 5 %), marked but not excluded" in words
+    page = words_of(recording)
+    assert not [text for text in (*words, *map(str, recording.outliers)) if text not in page]
 
 
 ENTRY = {
@@ -834,41 +781,12 @@ def test_warnings_and_drops_left_out_stand_before_the_table(one: Recording) -> N
 
 def test_contributions_of_nothing_are_no_rows_of_a_budget(one: Recording, tmp_path: Path) -> None:
     recording = stated(one, tmp_path)
-    page = report_page(report_data(recording))
-    shares = re.findall(r'data-label="Share">([^<]*)<', page)
+    shares = re.findall(r'data-label="Share">([^<]*)<', report_page(report_data(recording)))
     assert shares
     assert "0.0\N{NO-BREAK SPACE}%" not in shares
     level = criteria_data(recording)[0]
-    small = [
-        p for p in level["contributions"] if 0 < p["uncertainty"] < 0.01 * level["uncertainty"]
-    ]
-    assert small
-
-
-def test_reflows_on_a_narrow_screen(one: Recording, tmp_path: Path) -> None:
-    browser = shutil.which("chromium") or shutil.which("google-chrome")
-    if browser is None:
-        pytest.skip("there is no chromium")
-    path = tmp_path / "report.html"
-    page = report_page(report_data(stated(one, tmp_path)))
-    root = "document.documentElement"
-    width = f"<script>document.title=`${{innerWidth}} ${{{root}.scrollWidth-{root}.clientWidth}}`"
-    path.write_text(page.replace("</body>", f"{width}</script></body>"))
-    for pixels in (390, 1000):
-        # The smallest window of chromium is wider than 390 pixels; a frame is not.
-        frame = f'<iframe src="report.html" width="{pixels}" style="border: 0"></iframe>'
-        show = "<script>onload=()=>document.title=frames[0].document.title</script>"
-        (tmp_path / "frame.html").write_text(frame + show)
-        printed = subprocess.run(
-            [
-                browser, "--headless", "--no-sandbox", "--disable-gpu",
-                "--allow-file-access-from-files", "--virtual-time-budget=2000",
-                f"--user-data-dir={tmp_path}/browser", "--dump-dom",
-                (tmp_path / "frame.html").as_uri(),
-            ],
-            check=True, capture_output=True, timeout=120,
-        )  # fmt: skip
-        assert f"<title>{pixels} 0</title>" in printed.stdout.decode()
+    sizes = [part["uncertainty"] / level["uncertainty"] for part in level["contributions"]]
+    assert any(0 < size < 0.01 for size in sizes)
 
 
 @pytest.mark.slow
