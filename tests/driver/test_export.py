@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 soundfile = pytest.importorskip("soundfile", reason="the extra recordings is not installed")
+pytest.importorskip("pyuff", reason="the extra recordings is not installed")
 
 IMPACT = thud.solve()
 FORCE = blocked_force(IMPACT)
@@ -48,8 +49,6 @@ def half_sine(rate: float, start: float = 0.0) -> BlockedForce:
     ("kind", "digits"), [("wav", 2.0**-24), ("csv", 0), ("uff", 5e-12), ("mat", 0)]
 )
 def test_files_hold_the_force_to_their_last_digit(kind: str, digits: float, tmp_path: Path) -> None:
-    if kind == "uff":
-        pytest.importorskip("pyuff", reason="the extra recordings is not installed")
     ending, _ = EXPORTS[kind]
     path = tmp_path / f"force{ending}"
     FORCE.save(path)
@@ -66,8 +65,6 @@ def test_files_tell_units_rate_kind_and_checksum(tmp_path: Path) -> None:
     thud.write_case(IMPACT.case, tmp_path / "case.nml")
     checksum = hashlib.sha256((tmp_path / "case.nml").read_bytes()).hexdigest()
     for kind, (ending, _) in EXPORTS.items():
-        if kind == "uff":
-            pytest.importorskip("pyuff", reason="the extra recordings is not installed")
         FORCE.save(tmp_path / f"force{ending}")
         text = (tmp_path / f"force{ending}").read_bytes()
         if kind == "mat":
@@ -136,8 +133,6 @@ def test_words_of_others_stay_in_their_lines(tmp_path: Path) -> None:
     note = Note("sign_stated", others={"polarity": "a\r\nb"})
     force = replace(FORCE, name="b\udcffll", origin="first\nsecond,3", notes=(note,))
     for ending, _ in EXPORTS.values():
-        if ending == ".uff":
-            pytest.importorskip("pyuff", reason="the extra recordings is not installed")
         force.save(tmp_path / f"force{ending}")
     (signal,) = opened(tmp_path / "force.csv")
     assert np.array_equal(signal.read(0, signal.n_sample), FORCE.force)
