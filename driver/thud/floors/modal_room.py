@@ -31,6 +31,10 @@ if TYPE_CHECKING:
 
 # Maximum number of positions of ball or microphone.
 MAX_POSITIONS = 1000
+# Attributes of a `ModalRoom` that are those of the answer of the library.
+_AS_ANSWERED = (
+    "frequency", "crossover", "mean", "spread", "floor_energy", "room_energy", "sample_rate",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -174,19 +178,13 @@ def modal_room(
     return ModalRoom(
         prediction=prediction,
         size=size,
-        frequency=answer["frequency"],
-        crossover=answer["crossover"],
         balls=answer["ball"].T,
         microphones=answer["microphone"].T,
         level=answer["level"].transpose(2, 1, 0),
-        mean=answer["mean"],
-        spread=answer["spread"],
+        pressure=answer["pressure"].transpose(2, 1, 0),
         floor_modes=int(answer["floor_modes"]),
         room_modes=int(answer["room_modes"]),
-        floor_energy=answer["floor_energy"],
-        room_energy=answer["room_energy"],
-        pressure=answer["pressure"].transpose(2, 1, 0),
-        sample_rate=answer["sample_rate"],
+        **{name: answer[name] for name in _AS_ANSWERED},
     )
 
 
