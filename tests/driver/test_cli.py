@@ -88,7 +88,7 @@ def test_exit_codes_are_those_of_the_executable(
 
 @pytest.mark.parametrize("arguments", [[], ["run"], ["run", "--what", "x.nml"], ["--what"]])
 def test_bad_usage_is_told(arguments: list[str], errors_of: ErrorsOf) -> None:
-    assert "usage: thud-driver" in errors_of(*arguments)
+    assert errors_of(*arguments).count("\n") == 1
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import argparse
 import os
 import signal
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 from thud.base.bridge import version
 from thud.base.checks import refuse, suggestion
@@ -98,6 +98,10 @@ class _Parser(argparse.ArgumentParser):
     def _print_message(self, message: str, file: SupportsWrite[str] | None = None) -> None:
         to_screen = file in {None, sys.stderr} and is_terminal(sys.stderr)
         print(wrap(message) if to_screen else message, end="", file=file or sys.stderr)
+
+    def error(self, message: str) -> NoReturn:
+        """Print one sentence without the usage, which --help prints."""
+        self.exit(InputError.exit_code, f"{self.prog}: {message} (usage: {self.prog} --help)\n")
 
 
 def new_parser() -> argparse.ArgumentParser:

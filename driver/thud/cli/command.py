@@ -108,8 +108,8 @@ def file_of(*kinds: str) -> Callable[[str], str]:
         kind = kind_of(text)
         if kind and kind not in kinds:
             message = (
-                f"{text} is a {kind}; allowed: a {' or '.join(kinds)}; for it: "
-                f"thud-driver {FILE_KINDS[kind][1]}"
+                f"{text} is a {kind}; allowed: a {' or '.join(kinds)}; a {kind} is "
+                f"read by thud-driver {FILE_KINDS[kind][1]}"
             )
             raise argparse.ArgumentTypeError(message)
         endings = (ending for name in kinds for ending in FILE_KINDS[name][0])

@@ -127,7 +127,7 @@ def newtons_per_unit(
             refuse(
                 f"{label}: calibration {calibration.chain!r} does not convert {unit} to N with "
                 "all of its factors",
-                EXAMPLES,
+                "no calibration of values in N" if base == "N" else EXAMPLES,
             )
         value, uncertainty = product * size, calibration.uncertainty
         origin = f" ({calibration.origin})" if calibration.origin else ""

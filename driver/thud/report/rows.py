@@ -81,8 +81,8 @@ def drop_table(data: dict[str, Any]) -> list[tuple[str, ...]]:
         (
             drop["name"],
             number(drop["onset"], 3),
-            _with_u(drop["contact_time"], 1e3, 2),
-            *(_with_u(drop["restitutions"].get(method), 1.0, 3) for method in methods or [""]),
+            _with_u(drop["contact_time"], 1e3, 3),
+            *(_with_u(drop["restitutions"].get(method), 1.0, 4) for method in methods or [""]),
             _text(drop["peak_force"]["value"], 1.0, 0),
             *(_text(level, 1.0, 2) for level in own),
         )
@@ -94,8 +94,8 @@ def drop_table(data: dict[str, Any]) -> list[tuple[str, ...]]:
 def _with_u(estimate: dict[str, float] | None, scale: float, decimals: int) -> str:
     if not estimate or estimate["value"] is None:
         return NOT_KNOWN
-    width = number(scale * estimate["uncertainty"], decimals + 1)
-    return f"{number(scale * estimate['value'], decimals)} ± {width}"
+    value, width = (number(scale * estimate[key], decimals) for key in ("value", "uncertainty"))
+    return f"{value} ± {width}"
 
 
 def value_text(criterion: dict[str, Any]) -> str:

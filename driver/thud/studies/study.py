@@ -309,6 +309,7 @@ def table_of(content: Mapping[str, Any], name: str) -> dict[str, Any]:
 
 def _read_case(entry: object, folder: Path, fixed: Mapping[str, Any], case: Case | None) -> Case:
     """Return the case of a study: a namelist file, tables of groups, or an object."""
+    require_kind("case", case, Case | None)
     if not isinstance(entry, str | Mapping | None) or (entry is not None and case is not None):
         refuse_value("case", entry, "the path of a namelist file, tables of its groups, or case=")
     if isinstance(entry, Mapping):
