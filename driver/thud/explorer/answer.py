@@ -154,6 +154,7 @@ def _criterion(criterion: Criterion, source: LimitsSource) -> Answer:
         "value": None if np.isnan(criterion.value) else round(scale * criterion.value, 6),
         "value_text": quantity.show(criterion.value),
         "uncertainty": expanded if expanded > smallest and expanded < np.inf else None,
+        "uncertainty_text": f"{scale * estimate.expanded:.{quantity.decimals}f}",
         "uncertainty_kind": "numerical" if criterion.is_computed else "measured",
         "lower": round(scale * criterion.lower, 6),
         "upper": round(scale * criterion.upper, 6),

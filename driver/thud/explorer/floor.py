@@ -75,8 +75,8 @@ def floor_answer(impact: Impact, on_floor: FloorImpact) -> Answer:
         "numbers": [
             ["peak force relative to rigid floor", change, "dB"],
             ["restitution", on_floor.restitution, ""],
-            ["maximum displacement", 1e3 * on_floor.floor_displacement.max(), "mm"],
-            ["energy into the floor", on_floor.floor_work, "J"],
+            ["maximum displacement", 1e6 * on_floor.floor_displacement.max(), "µm"],
+            ["energy into the floor", 1e3 * on_floor.floor_work, "mJ"],
         ],
         "header": header,
         "rows": rows,

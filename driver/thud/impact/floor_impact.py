@@ -126,7 +126,7 @@ class FloorImpact(Impact):
                 "blocked, dB": (self.blocked_levels(), ".2f"),
                 "contact, dB": (self.levels(force="floor"), ".2f"),
                 "difference, dB": (self.difference(), ".2f"),
-                "energy, J": (energy.energy, ".3g"),
+                "energy, mJ": (1e3 * energy.energy, ".3g"),
             }
         )
 

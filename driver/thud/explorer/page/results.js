@@ -59,7 +59,7 @@ function showForces(variants, { thirds }) {
       y: levelsOf(variant).level, ends: thirds ? undefined : octavesOf(variant).map(endsOf),
     })),
     x: { title: thirds ? "One-third-octave band" : "Octave band", unit: "Hz", bands: bands.map(String) },
-    y: { title: "Level", unit: "dB", reference: " re 1 N" },
+    y: { title: "Level", unit: "dB", reference: " re 1 N, 1 s" },
     limits: thirds ? undefined : octavesOf(first).map((criterion) => [criterion.lower, criterion.upper]),
     results: octavesOf(first).map(({ result }) => result),
   });
