@@ -130,7 +130,7 @@ def test_bad_input_is_refused(shell: thud.Impact) -> None:
 
 
 def test_figure_draws_sources_and_floors(linear: thud.BallImpedance) -> None:
-    figure = linear.plot({"chipboard": thud.InfinitePlate(resistance=1600.0)})
+    figure = linear.plot(floors={"chipboard": thud.InfinitePlate(resistance=1600.0)})
     (axes,) = figure.axes
     assert len(axes.lines) == 3
     np.testing.assert_allclose(axes.lines[0].get_ydata(), 1600.0)

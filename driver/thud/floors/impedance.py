@@ -107,7 +107,7 @@ class BallImpedance(Tabulated):
         }
 
     def plot(
-        self, floors: Mapping[str, FloorOptions] | None = None, ax: Axes | None = None
+        self, ax: Axes | None = None, floors: Mapping[str, FloorOptions] | None = None
     ) -> Figure:
         """Draw the impedances of source and floors, by name, and where levels change by 1 dB."""
         from thud.plot.floor_figures import ball_impedances

@@ -169,7 +169,7 @@ class RoomPrediction(RoomLevel, Tabulated):
             "energy, mJ": (1e3 * self.energy, ".3g"),
         }
 
-    def plot(self, measured: RoomLevels | None = None, ax: Axes | None = None) -> Figure:
+    def plot(self, ax: Axes | None = None, measured: RoomLevels | None = None) -> Figure:
         """Draw levels, also measured ones, and what they follow from; in axes the levels alone."""
         from thud.plot.room_figures import draw_levels, draw_prediction
 
