@@ -131,7 +131,9 @@ def read_dataset(path: Path) -> xr.Dataset:
     except (OSError, ValueError, KeyError, RuntimeError) as error:
         if is_failure(error):
             raise
-        refuse(f"{path} cannot be read", "results of a study, or remove it", error)
+        refuse(
+            f"{path} cannot be read", "the .nc or .partial of a study; remove a damaged one", error
+        )
     variables = dataset.variables.items()
     texts: dict[Any, Any] = {n: v.astype(object) for n, v in variables if v.dtype.kind == "U"}
     return dataset.assign(texts).drop_encoding()
