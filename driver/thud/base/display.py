@@ -17,6 +17,7 @@ from thud.base.errors import ReportWarning
 from thud.base.extras import data_frame, require_extra
 from thud.base.files import replace_file
 from thud.base.immutable import Immutable
+from thud.base.note import decimal_text
 from thud.base.tables import csv_text
 
 if TYPE_CHECKING:
@@ -111,7 +112,10 @@ class Tabulated(Displayed):
 def column_rows(columns: Columns) -> list[tuple[str, ...]]:
     """Return header and rows of text of `Tabulated.columns`."""
     # NaN alone differs from itself.
-    cells = [["" if v != v else f"{v:{form}}" for v in values] for values, form in columns.values()]  # noqa: PLR0124
+    cells = [
+        ["" if v != v else decimal_text(v, form) for v in values]  # noqa: PLR0124
+        for values, form in columns.values()
+    ]
     return [tuple(columns), *zip(*cells, strict=True)]
 
 

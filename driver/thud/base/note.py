@@ -63,7 +63,7 @@ class _Range:
         ordered = sorted(set(self.values), key=lambda value: (isinstance(value, str), value))
         if form == "list":
             return _listed([int(value) for value in ordered])
-        texts = list(dict.fromkeys(_text(value, form) for value in ordered))
+        texts = list(dict.fromkeys(decimal_text(value, form) for value in ordered))
         return texts[0] if len(texts) == 1 else f"{texts[0]} to {texts[-1]}"
 
 
@@ -84,10 +84,10 @@ def sentence(notes: Sequence[Note]) -> str:
     return (part + text).format(**values)
 
 
-def _text(value: float | str, form: str) -> str:
+def decimal_text(value: float | str, form: str) -> str:
     """Return a value by a format, never with an exponent.
 
-    >>> _text(2e4, ".4g"), _text(2.5e-5, ".2g")
+    >>> decimal_text(2e4, ".4g"), decimal_text(2.5e-5, ".2g")
     ('20000', '0.000025')
     """
     text = format(value, form)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from decimal import Decimal
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -17,6 +16,7 @@ from thud.base._schema import (
     Room,
 )
 from thud.base.errors import ThudError
+from thud.base.note import decimal_text
 from thud.base.units import display_unit
 from thud.case.keys import humanize
 from thud.floors.description import CONTRIBUTIONS, case_layers, rating_title, verdict_text
@@ -239,7 +239,7 @@ def number_text(value: float, form: str = ".3g") -> str:
     >>> number_text(-0.123), number_text(4.45e-5), number_text(1e5, ".5g"), number_text(66.092)
     ('−0.123', '0.0000445', '100000', '66.1')
     """
-    return f"{Decimal(f'{value:z{form}}'):f}".replace("-", "−")
+    return decimal_text(value, f"z{form}").replace("-", "−")
 
 
 def band_rows(floor: PredictedFloor) -> list[tuple[str, ...]]:
