@@ -188,12 +188,12 @@ class PredictedFloor:
     @cached_property
     def changes(self) -> tuple[Change, ...]:
         """Changes of the rating by changes of floor and room, each predicted again."""
-        source, floor = self.prediction.source, self.prediction.floor
-        result = []
-        for text, changed_floor, changed_room in _variants(floor, self.prediction.room):
+        now, result = self.prediction, []
+        for text, of_floor, of_room in _variants(now.floor, now.room):
             try:
-                changed = predict_level(source, changed_floor, changed_room)
-                difference = changed.rating.level - self.prediction.rating.level
+                floor, room = replace(now.floor, **of_floor), replace(now.room, **of_room)
+                changed = predict_level(now.source, floor, room)
+                difference = changed.rating.level - now.rating.level
             except ThudError:
                 difference = np.nan
             result.append(Change(text, difference))
@@ -339,8 +339,8 @@ def _value_text(key: Key, value: object) -> str:
 def _variants(
     floor: Any,  # noqa: ANN401 - the keys of floors differ
     room: Room,
-) -> Iterator[tuple[str, FloorOptions, Room]]:
-    """Yield changes of floor and room in words, with the changed floor and room."""
+) -> Iterator[tuple[str, dict[str, Any], dict[str, Any]]]:
+    """Yield changes in words, with the changed values of keys of the floor and of the room."""
     # The mobility or the modes of a known floor do not follow its plate.
     is_computed = not isinstance(floor, ModalFloor | MeasuredMobility)
     for key, title in _THICKNESSES.items():
@@ -349,12 +349,11 @@ def _variants(
             changed = (
                 (value[0] + _ADDED, *value[1:]) if isinstance(value, tuple) else value + _ADDED
             )
-            yield f"{title} +{1e3 * _ADDED:g} mm", replace(floor, **{key: changed}), room
+            yield f"{title} +{1e3 * _ADDED:g} mm", {key: changed}, {}
     for text, (key, factor, plate) in _FACTORS.items():
         if getattr(floor, plate, 0.0):
-            yield text, replace(floor, **{key: factor * getattr(floor, key)}), room
+            yield text, {key: factor * getattr(floor, key)}, {}
     if room.ceiling_mass:
-        heavy = replace(room, ceiling_mass=2 * room.ceiling_mass)
-        yield "mass of the ceiling doubled", floor, heavy
+        yield "mass of the ceiling doubled", {}, {"ceiling_mass": 2 * room.ceiling_mass}
     times = tuple((2 * np.atleast_1d(room.reverberation_time)).tolist())
-    yield "reverberation time doubled", floor, replace(room, reverberation_time=times)
+    yield "reverberation time doubled", {}, {"reverberation_time": times}
