@@ -254,3 +254,22 @@ def test_two_runs_at_once_leave_the_whole_results(
     found = thud.read_sweep(tmp_path / "python.nc").dataset
     assert values(found).identical(values(thud.sweep(HEIGHTS).dataset))
     assert names_in(tmp_path) == ["python.nc"]
+
+
+def test_blocks_of_another_version_are_never_joined(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They are of a run that replaces the results at the same time."""
+    monkeypatch.setattr("thud.studies.study._BLOCK_SIZE", 1)
+    write = run.write_dataset
+
+    def replace_last(block: xr.Dataset, path: Path) -> None:
+        is_last = path.name.endswith("1.nc")
+        write(block.assign_attrs(identity="{}") if is_last else block, path)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(run, "write_dataset", replace_last)
+        with pytest.raises(thud.InputError, match=naming("python.partial", "another version")):
+            thud.sweep(HEIGHTS, tmp_path)
+    found = thud.sweep(HEIGHTS, tmp_path).dataset
+    assert values(found).identical(values(thud.sweep(HEIGHTS).dataset))

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, TypedDict, TypeVar, Unpack
 from tqdm import tqdm
 
 from thud.base.bridge import api, version
-from thud.base.checks import refuse, refuse_unknown, require_whole, shown
+from thud.base.checks import refuse, refuse_unknown, require_kind, require_whole, shown
 from thud.base.errors import InputError, NumericalError, ThudError
 from thud.base.extras import require_extra
 from thud.base.files import replace_file
@@ -177,6 +177,16 @@ def run(
     if file is None or partial is None:
         return join_blocks(study, [finished[start] for start in starts])
     blocks = [read_dataset(_block(partial, start)) for start in starts]
+    # A run of another version that replaces the results at the same time writes there as well.
+    foreign = [
+        start
+        for start, block in zip(starts, blocks, strict=True)
+        if block.attrs["identity"] != provenance["identity"]
+    ]
+    for start in foreign:
+        remove(_block(partial, start))
+    if foreign:
+        refuse(f"{partial} has got blocks of another version of this study", "run it again")
     write_dataset(join_blocks(study, blocks), file)
     remove(partial)
     return read_dataset(file)
@@ -203,6 +213,7 @@ def _executor(options: RunOptions) -> Iterator[tuple[Executor, int]]:
     """Yield the executor, and the number of blocks that it has at a time."""
     workers, executor = options.get("workers"), options.get("executor")
     if executor is not None:
+        require_kind("executor", executor, Executor)
         if workers is not None:
             refuse(f"workers = {shown(workers)} with an executor", "none: it has its own workers")
         yield executor, _SUBMITTED
