@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from decimal import Decimal
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -106,6 +107,10 @@ def test_groups_take_numbers_of_numpy_and_refuse_wrong_types(kind: type[Group]) 
             assert kind(**{name: equal}) == kind(**{name: equal.item()})
         for wrong in WRONG:
             refused(lambda name=name, wrong=wrong: repr(kind(**{name: wrong})))
+        if name in kind.keys and isinstance(value, int | float):
+            # Equal to the default, but not of its type.
+            with pytest.raises(TypeError):
+                kind(**{name: Decimal(value)})
 
 
 @pytest.mark.parametrize(

@@ -554,6 +554,9 @@ def test_fixed_values_may_suit_parameters_only() -> None:
 def test_unknown_keywords_are_reported() -> None:
     with pytest.raises(thud.InputError, match=naming("'threads'", "workers")):
         thud.sweep(HEIGHTS, threads=2)
+    for word in ("case", "executor", "surrogate"):
+        with pytest.raises(TypeError, match=word):
+            thud.sweep(HEIGHTS, **{word: 3})
 
 
 def test_parameters_of_python_are_those_of_files() -> None:

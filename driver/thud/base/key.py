@@ -138,5 +138,7 @@ class Group:
             if isinstance(option.default, tuple) and isinstance(value, int | float | str):
                 value = (value,)
             object.__setattr__(self, option.name, value)
-            if key and value != option.default:
+            # The default of an optional key may be outside its range; True equals 1.
+            kinds = {type(option.default), *_TYPES[key.kind]} if key else ()
+            if key and not (value == option.default and type(value) in kinds):
                 key.require(value, of_file=False)

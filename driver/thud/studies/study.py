@@ -316,7 +316,8 @@ def _read_case(entry: object, folder: Path, fixed: Mapping[str, Any], case: Case
         case = Case.from_namelist(entry)
     elif entry is not None:
         case = read_case(folder / entry)
-    case = case or Case()
+    case = Case() if case is None else case
+    require_kind("case", case, Case)
     if (model := fixed.get("model")) is not None:
         if not isinstance(model, str):
             refuse_value("[fixed] model", model, ", ".join(MODELS))
