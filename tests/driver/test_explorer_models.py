@@ -141,6 +141,13 @@ def test_modulus_that_is_too_low_is_named_with_three_digits() -> None:
     assert not re.search(r"\d\.\d{3,}", report["error"])
 
 
+@pytest.mark.parametrize("value", ["x", True, None])
+def test_value_of_a_wrong_type_is_not_named_as_a_number(value: object) -> None:
+    report = error_of({"drop": {"height": value}})
+    assert report["field"] == "drop.height"
+    assert f"= {value!r} is" in report["error"]
+
+
 @pytest.mark.parametrize("modulus", [1e4, 3e4, 5e4])
 def test_duration_that_a_message_allows_is_accepted(modulus: float) -> None:
     # A coarse mesh: only the check of the duration matters.

@@ -45,8 +45,9 @@ def refuse(  # noqa: PLR0913 - the fields of a note
     values of the note.
     """
     others |= {"name": name, "text": f"{problem}; allowed: {allowed}"}
-    is_number = isinstance(value, int | float) and not math.isnan(low) and abs(value) <= MAX_NUMBER
-    number = float(value) if is_number else math.nan  # type: ignore[arg-type]
+    number = math.nan
+    if isinstance(value, int | float) and not (isinstance(value, bool) or math.isnan(low)):
+        number = float(value) if abs(value) <= MAX_NUMBER else math.nan
     note = Note("refused", subject or name, number, low, high, others=others)
     raise InputError(str(note).lstrip(), note) from cause
 
