@@ -196,6 +196,13 @@ def test_useless_numbers_of_workers_are_reported(workers: int) -> None:
         thud.sweep(STUDY, workers=2, executor=executor)
 
 
+def test_ended_executor_is_reported() -> None:
+    executor = ThreadPoolExecutor(1)
+    executor.shutdown()
+    with pytest.raises(thud.NumericalError, match=naming("executor", "run the study again")):
+        thud.sweep(STUDY, executor=executor)
+
+
 def test_lost_process_is_reported_and_finished_blocks_are_kept(
     expected_modal: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

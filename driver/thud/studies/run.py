@@ -8,7 +8,7 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExec
 from contextlib import contextmanager
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, TypedDict, TypeVar, Unpack
+from typing import TYPE_CHECKING, Any, TypedDict, TypeVar, Unpack
 
 from tqdm import tqdm
 
@@ -244,7 +244,7 @@ def _compute(
             for start in islice(waiting, limit - len(running)):
                 columns = study.parameter_columns(start, _stop(study, start))
                 block = study.case, study.key_columns(columns), version(), study.surrogate
-                running[executor.submit(evaluate, *block)] = start
+                running[_submit(executor, *block)] = start
             if not running:
                 return
             done, _ = wait(running, return_when=FIRST_COMPLETED)
@@ -266,6 +266,16 @@ def _compute(
     finally:
         for future in running:
             future.cancel()
+
+
+def _submit(executor: Executor, *block: Any) -> Future[Columns]:  # noqa: ANN401 - of `evaluate`
+    """Return the future of a block; of an executor that has ended, one that failed."""
+    try:
+        return executor.submit(evaluate, *block)
+    except RuntimeError as error:
+        lost: Future[Columns] = Future()
+        lost.set_exception(error)
+        return lost
 
 
 def evaluate(
