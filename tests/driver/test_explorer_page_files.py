@@ -7,7 +7,7 @@ from importlib import resources
 
 PAGE = resources.files("thud.explorer") / "page"
 EXPORTED = re.compile(r"^export (?:async )?(?:function|const|let|class) +(\w+)", re.MULTILINE)
-IMPORTED = re.compile(r'^import \{([^}]+)\} from "\./([\w.]+)";$', re.MULTILINE)
+IMPORTED = re.compile(r'^import \{([^}]+)\} from "thud/([\w.]+)";$', re.MULTILINE)
 
 
 def test_each_imported_name_exists_and_is_used() -> None:

@@ -99,7 +99,7 @@ def room_answer(prediction: RoomPrediction) -> Answer:
         "level": to_json(prediction.level),
         "uncertainty": to_json(prediction.uncertainty),
         "contributions": [
-            [CONTRIBUTIONS[name].title, -value, value]
+            [CONTRIBUTIONS[name].title, value]
             for name, value in prediction.rating.contributions.items()
         ],
         "size": {

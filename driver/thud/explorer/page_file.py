@@ -22,7 +22,7 @@ FOLDER = resources.files("thud.explorer") / "page"
 # Modules of the first picture.
 FIRST = ("page", "storage", "request", "plot", "results", "first")
 # What an address of data may contain as it is.
-_SAFE = "".join(character for character in map(chr, range(32, 127)) if character not in "%#")
+_SAFE = "".join(map(chr, range(32, 127))).translate({37: None, 35: None})
 # The page loads its own modules, and plays and shows what it has made or downloaded with its token.
 _POLICY = (
     "default-src 'none'; connect-src 'self'; img-src data: blob:; media-src blob:; "
@@ -37,15 +37,10 @@ def first_answer(values: Mapping[str, Any]) -> dict[str, Any]:
     return {"values": values, "answer": answer_case(new_case(values)) | {"motion": None}}
 
 
-def render_page(first: Mapping[str, Any] | None, address: str) -> tuple[str, str]:
+def render_page(first: Mapping[str, Any] | None) -> tuple[str, str]:
     """Return the page and its content security policy.
 
-    Parameters
-    ----------
-    first
-        Answer that it shows first, see `first_answer`; None: it has to ask.
-    address
-        Address of the server, which ends with a slash.
+    `first` is the answer that it shows first, see `first_answer`; None: it has to ask.
     """
     nonce = secrets.token_urlsafe(16)
     page = _TEMPLATES.get_template("index.html")
@@ -54,18 +49,15 @@ def render_page(first: Mapping[str, Any] | None, address: str) -> tuple[str, str
         for file in FOLDER.iterdir()
         if file.name.endswith(".js") and file.name.removesuffix(".js") not in FIRST
     )
-    content = page.render(first=first, imports=_import_map(address), others=others, nonce=nonce)
+    content = page.render(first=first, imports=_import_map(), others=others, nonce=nonce)
     return content, _POLICY.format(nonce=nonce)
 
 
-@lru_cache(maxsize=8)
-def _import_map(address: str) -> dict[str, dict[str, str]]:
+@lru_cache(maxsize=1)
+def _import_map() -> dict[str, dict[str, str]]:
     """Return the import map that has the modules of the first picture as data."""
-    texts = {name: (FOLDER / f"{name}.js").read_text(encoding="utf-8") for name in FIRST}
-    # An address of data has no folder in which its imports could be looked for.
-    imports = {
-        f"{address}page/{name}.js": "data:text/javascript,"
-        + quote(text.replace('from "./', f'from "{address}page/'), safe=_SAFE)
-        for name, text in texts.items()
-    }
+    imports = {"thud/": "./page/"}
+    for name in FIRST:
+        text = (FOLDER / f"{name}.js").read_text(encoding="utf-8")
+        imports[f"thud/{name}.js"] = f"data:text/javascript,{quote(text, safe=_SAFE)}"
     return {"imports": imports}

@@ -160,7 +160,7 @@ def new_application(
 
 
 async def _page(request: Request) -> Response:
-    content, policy = render_page(request.app.state.first, str(request.base_url))
+    content, policy = render_page(request.app.state.first)
     return HTMLResponse(content, headers={"Content-Security-Policy": policy})
 
 

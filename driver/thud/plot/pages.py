@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from importlib import resources
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
@@ -47,11 +46,9 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-# Scripts and style of plots, which the explorer shares. The page is one script: its parts neither
-# import nor export.
+# Modules and style of plots, which the explorer shares.
 _SHARED = resources.files("thud") / "explorer/page"
-_SCRIPTS = ("page.js", "plot.js")
-_MODULE = re.compile(r"^(?:import .*\n|export )", re.MULTILINE)
+_MODULES = "page.js", "plot.js"
 
 
 def html_page(
@@ -65,7 +62,6 @@ def html_page(
 
     Plots are as `plot` of ``explorer/page/plot.js`` takes them; the first has the full width.
     """
-    script = "".join((_SHARED / name).read_text(encoding="utf-8") for name in _SCRIPTS)
     return render(
         "plot/page.html",
         title=title,
@@ -74,7 +70,7 @@ def html_page(
         warnings=warnings,
         plots=plots,
         style=(_SHARED / "plot.css").read_text(encoding="utf-8"),
-        script=_MODULE.sub("", script),
+        modules={name: (_SHARED / name).read_bytes() for name in _MODULES},
     )
 
 

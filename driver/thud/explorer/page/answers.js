@@ -1,8 +1,8 @@
-// Requests and answers of the doors: which answers are current, messages, and the tasks of the server.
-import { byId, button, element } from "./page.js";
-import { ConnectionError, ServerError, ask, follow } from "./request.js";
-import { about, caseValues, isTyping, markField, state } from "./form.js";
-import { isLaboratory, recording, recordingBody, recordingRequest } from "./recording.js";
+// Requests and answers of the doors, messages, and the tasks of the server.
+import { byId, button, element } from "thud/page.js";
+import { ConnectionError, ServerError, ask, follow } from "thud/request.js";
+import { about, caseValues, isTyping, markField, state } from "thud/form.js";
+import { isLaboratory, recording, recordingBody, recordingRequest } from "thud/recording.js";
 
 // Pause before a slow case is requested, and before outdated results are dimmed, ms.
 export const PAUSE = 120;
@@ -17,16 +17,14 @@ let dimTimer = 0;
 let retryTimer = 0;
 // Whether the message is about the present values.
 let hasError = false;
-// What the doors do with an answer, and with a field of the recording that the server misses.
-let onAnswer = null;
-let onMissing = null;
+// What is called after each answer, and with the name of a missing field of the recording.
+let listeners = {};
 
-/** Set what is called after each answer, and with the name of a missing field. */
-export function listenToAnswers(listeners) {
-  ({ onAnswer, onMissing } = listeners);
+export function listenToAnswers(newListeners) {
+  listeners = newListeners;
 }
 
-// ---- Requests: an answer is current as long as it answers the request of the present values and files.
+// ---- Requests: an answer is current if it is that to the present values and files.
 
 const fileIds = new WeakMap();
 let fileCount = 0;
@@ -43,7 +41,7 @@ export const subjectOf = (door) => JSON.stringify(door === "recording" ? recordi
 /** Return the text of the request of a door with its present values and files. */
 export const requestOf = (door) => JSON.stringify([subjectOf(door), door === "recording" && recordingRequest().values]);
 
-/** Return whether the answer of a door, if it needs one, is that to its present values and files. */
+/** Return whether the answer of a door is that to its present values and files. */
 export function isCurrent(door) {
   if (door === "recording" && !recording.files.length) return !current.recording;
   return current[door]?.request === requestOf(door);
@@ -52,14 +50,14 @@ export function isCurrent(door) {
 /** Return the name that the user has given to what a door shows. */
 export const titleOfDoor = (door) => (state.titles[door]?.subject === subjectOf(door) ? state.titles[door].text : undefined);
 
-/** Dim results that are not those of the present values, after a delay in ms, and disable what would save them. */
+/** Dim results of other values, after a delay in ms, and disable what would save them. */
 export function showStatus(delay = 0) {
   clearTimeout(dimTimer);
   const isOutdated = isTyping() || !isCurrent(state.door);
   byId("panel").setAttribute("aria-busy", String(Boolean(job || timer)));
   const show = () => {
     document.body.classList.toggle("outdated", isOutdated);
-    for (const target of [byId("report"), ...document.querySelectorAll(".figure .menu button")]) if (target) target.disabled = isOutdated;
+    for (const target of document.querySelectorAll("#report, .figure .menu button")) target.disabled = isOutdated;
   };
   if (isOutdated && delay) dimTimer = setTimeout(show, delay);
   else show();
@@ -67,7 +65,7 @@ export function showStatus(delay = 0) {
 
 let released = Promise.resolve();
 
-/** Let changes of the page wait for the end of a click, which would otherwise miss a button that moves. */
+/** Let changes of the page wait for the end of a click, which would miss a button that moves. */
 export function holdForClicks() {
   addEventListener("pointerdown", (event) => {
     if (!event.target.closest?.("button, summary, label")) return;
@@ -136,8 +134,8 @@ export function once(action) {
 
 // ---- Tasks of the server.
 
-/** Return the answer of a task; show its progress and a button to cancel it, by default from its first report. */
-export async function runTask(name, path, body, controller, { showNow = false, onReport = () => {} } = {}) {
+/** Return the answer of a task; show its progress and a button to cancel it. */
+export async function runTask(name, path, body, controller, { showNow, onReport = () => {} }) {
   const bar = element("progress", { max: 1, "aria-label": name });
   const line = element("div", { class: "task" }, element("span", {}, name), bar, button("Cancel", () => controller.abort()));
   const showTask = () => { if (!line.isConnected) byId("tasks").append(line); };
@@ -153,7 +151,7 @@ export async function runTask(name, path, body, controller, { showNow = false, o
   }
 }
 
-/** Compute the case or assess the recording, unless that is known, after cancelling a slow computation or waiting for a quick one. */
+/** Compute the case or assess the recording, if its answer is not known. */
 export async function solve() {
   clearTimeout(timer);
   timer = 0;
@@ -161,7 +159,7 @@ export async function solve() {
   job?.controller.abort();
   job = null;
   const { door } = state;
-  if (door === "recording" && !recording.files.length) { current.recording = null; onAnswer(); }
+  if (door === "recording" && !recording.files.length) { current.recording = null; listeners.onAnswer(); }
   if (isCurrent(door) && !current[door]?.isPartial) {
     if (hasError && !isTyping()) hideMessage();
     showStatus();
@@ -178,7 +176,7 @@ export async function solve() {
     current[door] = { door, style: 0, request: thisJob.request, slow: thisJob.slow, ...variant };
     if (state.door !== door || job !== thisJob) return;
     if (hasError && !isTyping()) hideMessage();
-    onAnswer();
+    listeners.onAnswer();
     // Time from the request to the next frame, for tests and benchmarks.
     requestAnimationFrame(() => { document.body.dataset.latency = String(performance.now() - thisJob.start); });
   } catch (error) {
@@ -186,8 +184,8 @@ export async function solve() {
     if (job === thisJob && !thisJob.repeat && !isTyping()) {
       showError(error);
       hasError = true;
-      const isMissing = door === "recording" && !state.recording[error.field] && about.recording.some((field) => field.name === error.field);
-      if (isMissing) onMissing(error.field);
+      const isField = about.recording.some(({ name }) => name === error.field);
+      if (isField && !state.recording[error.field]) listeners.onMissing(error.field);
     }
   } finally {
     if (job === thisJob) {

@@ -1,15 +1,15 @@
 // The three doors: what each shows, its variants, and the actions on its answer.
-import { byId, button, element, saveFile } from "./page.js";
-import { setFragment } from "./request.js";
-import { showAnswer, showFloors, showWarnings } from "./results.js";
-import { showBall } from "./ball.js";
-import { showRatings, showSection } from "./section.js";
-import { caseValues, isTyping, state, takeValues } from "./form.js";
-import { buildDoor, keepStated, recording, recordingBody, showAsks } from "./recording.js";
-import { freeStyle, nameVariants, showVariants } from "./variants.js";
-import { showSounds } from "./listen.js";
-import { PAUSE, cancel, computeSoon, current, hideMessage, isCurrent, kept, listenToAnswers, onInvalid, onTyping, once, requestOf, runTask, runningJob, showError, showMessage, showStatus, solve, subjectOf, titleOfDoor } from "./answers.js";
-import { commit, commitSoon, takeStep } from "./steps.js";
+import { byId, button, element, saveFile } from "thud/page.js";
+import { setFragment } from "thud/request.js";
+import { showAnswer, showFloors, showWarnings } from "thud/results.js";
+import { showBall } from "thud/ball.js";
+import { showRatings, showSection } from "thud/section.js";
+import { caseValues, isTyping, state, takeValues } from "thud/form.js";
+import { buildDoor, keepStated, recording, recordingBody, showAsks } from "thud/recording.js";
+import { freeStyle, nameVariants, showVariants } from "thud/variants.js";
+import { showSounds } from "thud/listen.js";
+import { PAUSE, cancel, computeSoon, current, hideMessage, isCurrent, kept, listenToAnswers, onInvalid, onTyping, once, requestOf, runTask, runningJob, showError, showMessage, showStatus, solve, subjectOf, titleOfDoor } from "thud/answers.js";
+import { commit, commitSoon, takeStep } from "thud/steps.js";
 
 const RECORDING_TEXT = "Choose the record of one drop or more. The answer is the verdict with its uncertainty, the levels within the limits of the standards, and a calibration report to save. Missing values can be stated afterwards: the page asks for those that matter.";
 export const DOORS = ["recording", "ball", "floor"];
@@ -25,7 +25,7 @@ function changePage(change) {
   const old = document.activeElement;
   change();
   const now = document.activeElement;
-  if (old === document.body || (old.isConnected && now === old) || (now && now !== document.body)) return;
+  if (old === document.body || now !== document.body) return;
   const next = byId(old.id);
   (next && !next.disabled ? next : byId("verdict")).focus({ preventScroll: true });
 }
@@ -35,9 +35,9 @@ function variantsOfDoor() {
   const { door } = state;
   const own = current[door];
   if (own) own.title = titleOfDoor(door);
-  if (door === "floor") return [own, ...kept.list.filter((variant) => variant.door === "floor")].filter(Boolean);
-  const others = kept.list.filter((variant) => variant.door !== "floor");
-  if (door === "ball" && current.recording && isCurrent("recording")) others.unshift({ ...current.recording, title: titleOfDoor("recording"), style: freeStyle(others) });
+  const others = kept.list.filter((variant) => (variant.door === "floor") === (door === "floor"));
+  if (door === "ball" && current.recording && isCurrent("recording"))
+    others.unshift({ ...current.recording, title: titleOfDoor("recording"), style: freeStyle(others) });
   return [own, ...others].filter(Boolean);
 }
 
@@ -101,13 +101,13 @@ function showNothing(door) {
   byId("detail").textContent = door === "recording" ? RECORDING_TEXT : "";
   delete byId("detail").dataset.subject;
   byId("open_warnings").replaceChildren();
-  for (const id of ["warnings_section", "ball_section", "section_section", "room_figure", "contributions_figure", "ratings_section", "floor_section", "sound_section"]) byId(id).hidden = true;
-  for (const id of ["levels_figure", "force_figure", "criteria_section"]) byId(id).hidden = door === "recording";
+  const sections = document.querySelectorAll("#warnings_section, .figure, .card");
+  for (const target of sections) target.hidden = true;
 }
 
 // ---- Variants.
 
-/** Keep the variant that the form describes; while a slow case is computed, the one that is shown. */
+/** Keep the variant of the form; while a slow case is computed, the one that is shown. */
 export async function keep() {
   const job = runningJob();
   if (job && !job.slow) await job.end;
@@ -131,13 +131,18 @@ function removeVariant(variant) {
   commit();
 }
 
+/** Name what a door shows. */
+function setTitle(door, text) {
+  state.titles = { ...state.titles, [door]: { text, subject: subjectOf(door) } };
+}
+
 /** Give a variant a name of the user; an empty one takes it back, and null changes nothing. */
 function renameVariant(variant, text) {
   const at = shown.indexOf(variant);
   const title = text?.trim() || undefined;
   if (text !== null && title !== variant.label) {
     if (kept.list.includes(variant)) kept.list = kept.list.map((other) => (other === variant ? { ...variant, title } : other));
-    else state.titles = { ...state.titles, [variant.door]: { text: title, subject: subjectOf(variant.door) } };
+    else setTitle(variant.door, title);
   }
   showAll();
   document.querySelectorAll("#variants .name")[at]?.focus();
@@ -186,9 +191,12 @@ listenToAnswers({
 
 // ---- Actions.
 
+/** Return the answer of a task that is shown at once. */
+const runAction = (...task) => runTask(...task, new AbortController(), { showNow: true });
+
 /** Save the calibration report of the recording. */
 const saveReport = once(async () => {
-  saveFile("calibration.html", await runTask("Calibration report", "report", recordingBody(), new AbortController(), { showNow: true }), "text/html");
+  saveFile("calibration.html", await runAction("Calibration report", "report", recordingBody()), "text/html");
 });
 
 const fit = () => fitTo("Fitting a ball to the recording", "fit", () => recordingBody(caseValues("ball")));
@@ -204,7 +212,7 @@ function onPress(body, name) {
 const fitTo = once(async (title, path, newBody) => {
   const requests = () => JSON.stringify([requestOf("ball"), requestOf("recording"), isTyping()]);
   const before = requests();
-  const answer = await runTask(title, path, newBody(), new AbortController(), { showNow: true });
+  const answer = await runAction(title, path, newBody());
   if (requests() !== before) {
     showMessage("The fit was not taken over: values have changed since it began");
     return;
@@ -215,12 +223,12 @@ const fitTo = once(async (title, path, newBody) => {
 /** Take over the values of a fit, and show its result beside them. */
 function showFit({ values, text, details, name }) {
   takeValues(values);
-  if (name) state.titles = { ...state.titles, ball: { text: name, subject: subjectOf("ball") } };
+  if (name) setTitle("ball", name);
   fitted = { text, details, isNew: true, values: JSON.stringify(caseValues("ball")) };
   openDoor("ball");
 }
 
-/** Return the button that looks for a change with which a source conforms or a required level is met, if there is a need. */
+/** Return the button that looks for a change that conforms or meets a requirement, if needed. */
 function improveButton(own) {
   if (!own?.values || ["conforms", "level"].includes(own.answer.headline.result)) return [];
   const title = own.answer.room ? `Change that meets ${own.values.room.required} dB` : "Smallest change that conforms";
@@ -230,7 +238,8 @@ function improveButton(own) {
 const improve = once(async (title) => {
   const { door } = state;
   const request = requestOf(door);
-  const { changes, none, note } = await runTask(title, "improve", JSON.stringify(caseValues(door)), new AbortController(), { showNow: true });
+  const values = JSON.stringify(caseValues(door));
+  const { changes, none, note } = await runAction(title, "improve", values);
   await runningJob()?.end;
   if (state.door !== door || requestOf(door) !== request) return;
   const apply = ({ key, value }) => {

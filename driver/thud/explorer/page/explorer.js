@@ -1,14 +1,14 @@
 // Start of the page: its menu, links, keys and files, and the case with which it begins.
-import { byId, button, element, saveFile } from "./page.js";
-import { ConnectionError, ask, firstAbout, fragment, setFragment, takeFragment } from "./request.js";
-import { firstVariant } from "./first.js";
-import { listenToBall } from "./ball.js";
-import { about, caseValues, invalidField, isCase, state, takeValues } from "./form.js";
-import { addFiles, recording } from "./recording.js";
-import { addPlotMenus, copyText, fileOf } from "./files.js";
-import { RETRY_INTERVAL, current, hideMessage, holdForClicks, kept, reconnect, showError, showMessage } from "./answers.js";
-import { commit, restoreStored } from "./steps.js";
-import { DOORS, formHandlers, keep, move, openDoor, showAll } from "./doors.js";
+import { byId, button, element, saveFile } from "thud/page.js";
+import { ConnectionError, ask, firstAbout, fragment, setFragment, takeFragment } from "thud/request.js";
+import { firstVariant } from "thud/first.js";
+import { listenToBall } from "thud/ball.js";
+import { about, caseValues, invalidField, isCase, state, takeValues } from "thud/form.js";
+import { addFiles, recording } from "thud/recording.js";
+import { addPlotMenus, copyText, fileOf } from "thud/files.js";
+import { RETRY_INTERVAL, current, hideMessage, holdForClicks, kept, reconnect, showError, showMessage } from "thud/answers.js";
+import { commit, restoreStored } from "thud/steps.js";
+import { DOORS, formHandlers, keep, move, openDoor, showAll } from "thud/doors.js";
 
 async function copyLink() {
   if (hasInvalidField()) return;
@@ -69,7 +69,7 @@ function reset() {
 
 /** Begin with the values of a case, or with the first preset. */
 function begin(start) {
-  Object.assign(state, { values: {}, unknowns: {}, recording: {}, earlier: [], titles: {}, model: about.presets[0].values.model.name });
+  Object.assign(state, { values: {}, unknowns: {}, recording: {}, earlier: [], titles: {}, model: "" });
   const floors = about.presets.find((preset) => preset.door === "floor");
   takeValues(floors.values);
   if (Object.keys(start).length) takeValues(start);
@@ -112,9 +112,11 @@ function listen() {
   byId("link").addEventListener("click", copyLink);
   byId("print").addEventListener("click", () => print());
   addEventListener("beforeprint", () => { byId("warnings_section").open = true; });
-  for (const name of Object.keys(state.view)) byId(name).addEventListener("change", () => { state.view[name] = byId(name).checked; showAll(); });
-  for (const target of document.querySelectorAll("[data-file]")) target.addEventListener("click", () => download(target.dataset.file));
-  for (const target of document.querySelectorAll("[data-copy]")) target.addEventListener("click", () => download(target.dataset.copy, target));
+  byId("thirds").addEventListener("change", ({ target }) => { state.view.thirds = target.checked; showAll(); });
+  for (const target of document.querySelectorAll("[data-file], [data-copy]")) {
+    const { file, copy } = target.dataset;
+    target.addEventListener("click", () => download(file ?? copy, copy && target));
+  }
   addEventListener("keydown", (event) => {
     if (event.key === "Escape") { for (const menu of document.querySelectorAll(".menu[open]")) { menu.open = false; menu.firstElementChild.focus(); } }
     // A field for text has steps of its own.
@@ -139,7 +141,7 @@ function listen() {
   listenToBall();
 }
 
-/** Show nothing but the message until a token arrives, in this page or another one; then load the page with its link. */
+/** Show only the message until a token arrives in this page or another; then load the page. */
 function awaitToken() {
   document.body.classList.add("locked");
   setTimeout(() => ask("about").then(() => location.reload(), () => {}), RETRY_INTERVAL);

@@ -1,7 +1,7 @@
 // Files and texts to send: plots, and the case as text.
-import { button, byId, element, saveFile, svgElement } from "./page.js";
-import { contentOf, imageOf } from "./plot.js";
-import { ask } from "./request.js";
+import { button, byId, element, saveFile, svgElement } from "thud/page.js";
+import { contentOf, imageOf } from "thud/plot.js";
+import { ask } from "thud/request.js";
 
 // Size of a saved plot, px.
 const SIZE = [720, 420];
@@ -33,12 +33,12 @@ function svgText(host) {
   }
 }
 
-/** Return the curves of a plot as comma-separated values, with limits and ends of ranges; no text of it is a formula of a spreadsheet. */
+/** Return a plot as comma-separated values; no text of it is a formula of a spreadsheet. */
 function csvText({ rows, curves, limits, x, y }) {
   const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
   const plain = (value) => (typeof value === "string" ? value.replace(/^[=+\-@]/, "'$&") : String(value ?? ""));
   const lines = (table) => `${table.map((row) => row.map((value) => quoted(plain(value))).join(",")).join("\n")}\n`;
-  if (rows) return lines([["contribution", `low, ${x.unit}`, `high, ${x.unit}`], ...rows]);
+  if (rows) return lines([["contribution", `${x.title}, ${x.unit}`], ...rows]);
   const columns = curves.map((curve) => `${curve.name}, ${y.unit}`);
   if (x.bands) {
     const table = curves.flatMap(({ y: values, ends = [] }, k) => [[columns[k], ...values],

@@ -1,10 +1,10 @@
-// First picture: the answer that the page itself contains or has stored, until the rest has arrived.
-import { byId } from "./page.js";
-import { fragment } from "./request.js";
-import { showAnswer } from "./results.js";
-import { stored, storedCase } from "./storage.js";
+// First picture: the answer that the page contains or has stored, until the rest has arrived.
+import { byId } from "thud/page.js";
+import { fragment } from "thud/request.js";
+import { showAnswer } from "thud/results.js";
+import { stored, storedCase } from "thud/storage.js";
 
-/** Variant with which the page begins, of which the motion is not known; null if it has to be computed. */
+/** Variant with which the page begins, without motion; null if it has to be computed. */
 export const firstVariant = findFirst();
 
 function findFirst() {

@@ -1,10 +1,17 @@
-// The case and its form: fields from the declarations of the keys, presets, models, constructions and the room.
-import { button, byId, capitalize, element, numberOf, numberProblem, scaled } from "./page.js";
-import { pressInputs } from "./press.js";
+// The case and its form: fields of the keys, presets, models, constructions and the room.
+import {
+  button, byId, capitalize, element, fieldRow, numberOf, numberProblem, scaled, select,
+} from "thud/page.js";
+import { pressInputs } from "thud/press.js";
 
-/** What the server says of itself, and the case: values that differ from their defaults, the construction that was chosen, what is not known, by model, fields of the recording and those that were stated for an earlier one, names of the user, and what the plots show. */
-export const about = { form: [], constructions: [], models: [], floors: [], presets: [], recording: [] };
-export const state = { door: "ball", model: "", floor: "plate", chosen: "", room: true, values: {}, unknowns: {}, recording: {}, earlier: [], titles: {}, view: { thirds: false } };
+/** What the server says of itself. */
+export const about = {};
+/** The case: values that differ from their defaults, the chosen construction, what is not known, by
+ * model, fields of the recording and those of an earlier one, names of the user, and the view. */
+export const state = {
+  door: "ball", model: "", floor: "plate", chosen: "", room: true, values: {}, unknowns: {},
+  recording: {}, earlier: [], titles: {}, view: { thirds: false },
+};
 
 // Digits of a number in its field.
 const DIGITS = 6;
@@ -12,17 +19,21 @@ const DIGITS = 6;
 const TYPING_PAUSE = 600;
 
 const groupsOf = (part) => about.form.filter((group) => group.part === part);
-const commonGroups = () => about.form.filter((group) => group.part === group.name && group.part !== "room");
+const commonGroups = () => about.form.filter(({ part, name }) => part === name && part !== "room");
 const findGroup = (part, name) => groupsOf(part).find((group) => group.name === name);
 const sourceGroups = () => [...commonGroups(), findGroup("model", state.model)].filter(Boolean);
-const floorGroups = () => [...(state.floor ? [findGroup("floor", state.floor)] : []), ...(showsRoom() ? groupsOf("room") : [])];
+const floorGroups = () =>
+  [findGroup("floor", state.floor), ...(showsRoom() ? groupsOf("room") : [])];
 
 /** Return what the server says of a model or a floor. */
-export const factsOf = (part, name) => about[`${part}s`].find((facts) => facts.name === name) ?? { title: name, values: {} };
+export const factsOf = (part, name) =>
+  about[`${part}s`].find((facts) => facts.name === name) ?? { title: name, values: {} };
+
+const allFields = () => about.form.flatMap(({ fields }) => fields);
 
 /** Return the field of a key. */
 export function findField(group, name) {
-  return about.form.flatMap(({ fields }) => fields).find((field) => field.group === group && field.name === name);
+  return allFields().find((field) => field.group === group && field.name === name);
 }
 
 /** Return the field on whose choice a field depends, if there is one. */
@@ -31,15 +42,16 @@ function switchOf(field) {
   return fields.find(({ name }) => name === field.condition[0]);
 }
 
-/** Return whether a field has an effect on a case, by default that of the form. */
-export function isUsed(field, model = state.model, read = valueOf) {
+/** Return whether a field has an effect on the case. */
+function isUsed(field) {
   const owner = switchOf(field);
-  return field.models?.includes(model) !== false && (!owner || field.condition.includes(read(owner), 1));
+  return field.models?.includes(state.model) !== false
+    && (!owner || field.condition.includes(valueOf(owner), 1));
 }
 
 const isSame = (one, other) => JSON.stringify(one) === JSON.stringify(other);
 
-/** Return the default of a field: of a calibrated key the value of the standard ball by the model. */
+/** Return the default of a field: of a calibrated key that of the standard ball by the model. */
 export const defaultOf = (field, model = state.model) => field?.standard?.[model] ?? field?.default;
 
 function valueOf(field) {
@@ -57,11 +69,12 @@ function setValue(field, value) {
 export function caseValues(door = state.door) {
   const values = { model: { name: state.model } };
   const hasFloor = door === "floor";
-  if (hasFloor && state.floor) values.floor = { name: state.floor };
+  if (hasFloor) values.floor = { name: state.floor };
   for (const { fields } of [...sourceGroups(), ...(hasFloor ? floorGroups() : [])]) {
     for (const field of fields) {
       const value = state.values[field.group]?.[field.name];
-      if (value !== undefined && isUsed(field)) (values[field.group] ??= {})[field.name] = value;
+      if (value === undefined || !isUsed(field)) continue;
+      (values[field.group] ??= {})[field.name] = value;
     }
   }
   if (hasFloor && showsRoom()) values.room ??= {};
@@ -76,18 +89,20 @@ const entriesOf = (values) => Object.entries(values)
   .flatMap(([group, own]) => Object.entries(own).map(([name, value]) => [findField(group, name), value]))
   .filter(([field]) => field);
 
-/** Return whether values are a case with a known model and floor, and have the kinds of their fields. */
+/** Return whether values are a case of a known model and floor, and of the kinds of their fields. */
 export function isCase(values) {
   if (!isTable(values) || !Object.values(values).every(isTable)) return false;
-  const isNumber = (item) => typeof item === "number";
-  const hasKind = ([field, value]) => (field.kind === "list" ? [value].flat().every(isNumber) : typeof value === typeof field.default);
-  return Boolean(findGroup("model", values.model?.name) && (!values.floor || findGroup("floor", values.floor.name))) && entriesOf(values).every(hasKind);
+  const { model, floor } = values;
+  const isKnown = findGroup("model", model?.name) && (!floor || findGroup("floor", floor.name));
+  return Boolean(isKnown) && entriesOf(values).every(([field, value]) => (field.kind === "list"
+    ? [value].flat().every((item) => typeof item === "number") : typeof value === typeof field.default));
 }
 
 /** Take over the source of a case, or all of it. */
 export function takeValues(values) {
   const { model, floor, ...rest } = values.model ? values : { ...values, ...about.presets[0].values };
-  const clear = (groups) => { for (const { fields } of groups) for (const field of fields) delete state.values[field.group]; };
+  const clear = (groups) => groups.flatMap(({ fields }) => fields)
+    .forEach(({ group }) => delete state.values[group]);
   clear(sourceGroups());
   state.model = model.name;
   if (floor) choose("floor", floor.name);
@@ -102,47 +117,53 @@ export function takeValues(values) {
   }
 }
 
-/** Choose a model or a floor: values that belong to the old one, where they were not changed, are replaced by those of the next. */
+/** Choose a model or a floor; its values replace those of the old one that were not changed. */
 function choose(part, name) {
-  for (const [field, value] of entriesOf(factsOf(part, state[part]).values)) if (isSame(valueOf(field), value)) setValue(field, defaultOf(field));
-  for (const [field, value] of entriesOf(factsOf(part, name).values)) setValue(field, value);
+  const valuesOf = (kind) => entriesOf(factsOf(part, kind).values);
+  for (const [field, value] of valuesOf(state[part]))
+    if (isSame(valueOf(field), value)) setValue(field, defaultOf(field));
+  for (const [field, value] of valuesOf(name)) setValue(field, value);
   state[part] = name;
 }
 
 /** Return whether the floor has a plate that radiates into a room. */
-const hasRoom = () => factsOf("floor", state.floor).has_room !== false;
+const hasRoom = () => factsOf("floor", state.floor).has_room;
 /** The room remains chosen while a floor has none. */
 const showsRoom = () => state.room && hasRoom();
 
 // ---- Constructions.
 
-/** Return the fields that a construction fills: those of its floor, and of the ceiling of the room. */
+/** Return the fields that a construction fills: those of its floor and of the ceiling. */
 const filledFields = (construction) => findGroup("floor", construction.floor).fields;
-const ceilingFields = () => findGroup("room", "room").fields.filter((field) => field.name.startsWith("ceiling_"));
+const ceilingFields = () =>
+  findGroup("room", "room").fields.filter(({ name }) => name.startsWith("ceiling_"));
+const hasCeiling = ({ room }) => Object.keys(room).length > 0;
 
-/** Return the construction whose values the form has, if there is one, and choose it; of several, the chosen one. */
+/** Choose the construction whose values the form has, if any, and return it. */
 function findConstruction() {
   const { floor } = state;
-  const ceiling = ceilingFields();
-  const equal = about.constructions.filter((entry) => entry.floor === floor && haveValues(filledFields(entry), { [floor]: entry.keys })
-    && (showsRoom() ? haveValues(ceiling, { room: entry.room }) : !Object.keys(entry.room).length));
+  const equal = about.constructions.filter((entry) => entry.floor === floor
+    && haveValues(filledFields(entry), { [floor]: entry.keys })
+    && (showsRoom() ? haveValues(ceilingFields(), { room: entry.room }) : !hasCeiling(entry)));
   const construction = equal.find(({ name }) => name === state.chosen) ?? equal[0];
   if (construction) state.chosen = construction.name;
   return construction;
 }
 
-/** Fill the fields of floor and ceiling with the values of a construction; a ceiling needs the room below. */
+/** Fill the fields of floor and ceiling by a construction; a ceiling needs the room below. */
 function fillConstruction(name) {
   const construction = about.constructions.find((entry) => entry.name === name);
   if (!construction) return;
-  Object.assign(state, { chosen: name, floor: construction.floor, room: state.room || Object.keys(construction.room).length > 0 });
-  for (const field of filledFields(construction)) setValue(field, construction.keys[field.name] ?? defaultOf(field));
-  for (const field of ceilingFields()) setValue(field, construction.room[field.name] ?? defaultOf(field));
+  const { floor, keys, room } = construction;
+  Object.assign(state, { chosen: name, floor, room: state.room || hasCeiling(construction) });
+  for (const [fields, values] of [[filledFields(construction), keys], [ceilingFields(), room]])
+    for (const field of fields) setValue(field, values[field.name] ?? defaultOf(field));
 }
 
 // ---- Form.
 
-/** Build the form of the current door; `onChange` is called after each change, `onTyping` while one is typed, `onInvalid` when what was typed is no value, `onPress` with the curve of a press. */
+/** Build the form of the current door. Of the handlers, `onChange` is called after each change,
+ * `onTyping` while one is typed, `onInvalid` if it is no value, `onPress` with a press curve. */
 export function buildInputs(handlers) {
   const { onChange } = handlers;
   const focus = document.activeElement?.id;
@@ -156,17 +177,16 @@ export function buildInputs(handlers) {
 /** Replace the form but for a choice that has the focus: typing its name goes on. */
 function replaceInputs(children) {
   const form = byId("inputs");
-  const select = form.querySelector(":scope > .choice select:focus");
-  const at = select ? children.findIndex((child) => child.querySelector?.(`:scope.choice > .field > #${select.id}`)) : -1;
-  if (at < 0) { form.replaceChildren(...children); return; }
-  const kept = select.closest(".choice");
+  const focused = form.querySelector(":scope > .choice select:focus");
+  const at = children.findIndex((child) => child.querySelector?.(`#${focused?.id}`));
+  if (!focused || at < 0) { form.replaceChildren(...children); return; }
+  const kept = focused.closest(".choice");
   for (const child of [...form.childNodes]) if (child !== kept) child.remove();
   kept.before(...children.slice(0, at));
   kept.after(...children.slice(at + 1));
   const { value } = children[at].querySelector("select");
-  if (select.value !== value) select.value = value;
-  for (const help of kept.querySelectorAll(":scope > .help")) help.remove();
-  kept.append(...children[at].querySelectorAll(":scope > .help"));
+  if (focused.value !== value) focused.value = value;
+  kept.replaceChildren(kept.firstChild, ...[...children[at].children].slice(1));
 }
 
 const balls = () => about.presets.filter(({ door }) => door === "ball");
@@ -177,18 +197,21 @@ const haveValues = (fields, values) => fields.every((field) =>
 
 /** Return whether the source of the form is that of a preset. */
 const isChosen = ({ values }) => values.model.name === state.model && !state.unknowns[state.model]
-  && sourceGroups().every(({ fields }) => haveValues(fields.filter((field) => isUsed(field)), values));
+  && sourceGroups().every(({ fields }) => haveValues(fields.filter(isUsed), values));
 
 function ballInputs(handlers) {
-  const choices = balls().map((preset) => button(preset.title, () => { takeValues(preset.values); handlers.rebuild(); },
+  const choose = ({ values }) => { takeValues(values); handlers.rebuild(); };
+  const choices = balls().map((preset) => button(preset.title, () => choose(preset),
     { id: `preset_${preset.name}`, "aria-pressed": String(isChosen(preset)), title: preset.text }));
   // The first two are both standard balls, and their lines say which to trust.
   const lines = balls().filter((preset, i) => i < 2 || isChosen(preset));
   const common = commonGroups();
   const own = findGroup("model", state.model);
   return [
-    element("fieldset", {}, element("legend", {}, "Start from"), element("div", { class: "choices" }, ...choices), pressInputs(handlers.onPress),
-      element("ul", { class: "help" }, ...lines.map(({ title, text }) => element("li", {}, element("b", {}, title), `: ${text}.`)))),
+    element("fieldset", {}, element("legend", {}, "Start from"),
+      element("div", { class: "choices" }, ...choices), pressInputs(handlers.onPress),
+      element("ul", { class: "help" }, ...lines.map(({ title, text }) =>
+        element("li", {}, element("b", {}, title), `: ${text}.`)))),
     kindInput("model", "Model", about.models, handlers),
     ...[...common.slice(0, 2), own, ...common.slice(2)].map((group) => groupElement(group, handlers)),
     foldedElement([own, ...common], handlers),
@@ -198,60 +221,68 @@ function ballInputs(handlers) {
 /** Return the choice of a model or a floor, and what it is for. */
 function kindInput(part, label, kinds, handlers) {
   const { purpose, validity } = factsOf(part, state[part]);
-  return choiceOf(part, label, kinds.map(({ name, title }) => [name, title]), state[part], (name) => { choose(part, name); handlers.rebuild(); },
+  const select = (name) => { choose(part, name); handlers.rebuild(); };
+  return choiceOf(part, label, kinds.map(({ name, title }) => [name, title]), state[part], select,
     element("p", { class: "help" }, `${purpose}. `, element("em", {}, validity)));
 }
 
 function floorInputs(handlers) {
   const construction = findConstruction();
-  const kinds = [...new Set(about.constructions.map(({ kind }) => kind))];
-  const options = [["", "None of the library"], ...kinds.map((kind) => [kind, about.constructions.filter((entry) => entry.kind === kind).map(({ name }) => [name, name])])];
+  const kinds = Map.groupBy(about.constructions, ({ kind }) => kind);
+  const options = [...kinds].map(([kind, entries]) => [kind, entries.map(({ name }) => [name, name])]);
   const sources = construction?.sources ?? {};
-  const rooms = groupsOf("room");
+  const [room] = groupsOf("room");
   const isRequirement = ({ name }) => ["required", "rating"].includes(name);
-  const withFields = (group, isOwn) => ({ ...group, fields: group.fields.filter(isOwn) });
+  const fieldsOfRoom = (title, isOwn) => (showsRoom()
+    ? groupElement({ ...room, title, fields: room.fields.filter(isOwn) }, handlers, sources) : "");
   const source = balls().find(isChosen);
+  const known = balls().map(({ name, title }) => [name, title]);
+  const droppable = source ? known : [["", "A changed source"], ...known];
+  const takeSource = (name) => takeValues(balls().find((preset) => preset.name === name).values);
   const box = element("input", { type: "checkbox", id: "has_room" });
   box.checked = showsRoom();
   box.disabled = !hasRoom();
   box.addEventListener("change", () => { state.room = box.checked; handlers.rebuild(); });
   return [
-    choiceOf("construction", "Construction", options, construction?.name ?? "", (name) => { fillConstruction(name); handlers.rebuild(); },
-      element("p", { class: "help", id: "construction_text" }, construction?.text ?? "Changed values of a floor.")),
-    choiceOf("source", "Dropped on it", [...(source ? [] : [["", "A changed source"]]), ...balls().map(({ name, title }) => [name, title])], source?.name ?? "",
-      (name) => { takeValues(balls().find((preset) => preset.name === name).values); handlers.rebuild(); }),
-    ...(showsRoom() ? rooms.map((group) => groupElement({ ...withFields(group, isRequirement), title: "Requirement" }, handlers)) : []),
+    choiceOf("construction", "Construction", [["", "None of the library"], ...options],
+      construction?.name ?? "", (name) => { fillConstruction(name); handlers.rebuild(); },
+      element("p", { class: "help", id: "construction_text" }, textOfConstruction(construction))),
+    choiceOf("source", "Dropped on it", droppable, source?.name ?? "", (name) => { takeSource(name); handlers.rebuild(); }),
+    fieldsOfRoom("Requirement", isRequirement),
     element("label", { class: "toggle" }, box, "Room below"),
-    ...(showsRoom() ? rooms.map((group) => groupElement(withFields(group, (field) => !isRequirement(field)), handlers, sources)) : []),
+    fieldsOfRoom(room.title, (field) => !isRequirement(field)),
     kindInput("floor", "Kind of floor", about.floors.filter(({ name }) => name !== "rigid"), handlers),
     groupElement(findGroup("floor", state.floor), handlers, sources),
     foldedElement(floorGroups(), handlers, sources),
   ];
 }
 
+const textOfConstruction = (entry) => entry?.text ?? "Changed values of a floor.";
+
 function choiceOf(id, label, options, value, onSelect, ...rest) {
-  const optionOf = ([name, title]) => (Array.isArray(title) ? element("optgroup", { label: name }, ...title.map(optionOf)) : element("option", { value: name }, title));
-  const select = element("select", { id }, ...options.map(optionOf));
-  select.value = value;
-  select.addEventListener("change", () => onSelect(select.value));
-  return element("div", { class: "choice" }, element("div", { class: "field" }, element("label", { for: id }, element("b", {}, label)), select), ...rest);
+  const input = select({ id }, options, value);
+  input.addEventListener("change", () => onSelect(input.value));
+  return element("div", { class: "choice" }, fieldRow(id, element("b", {}, label), input), ...rest);
 }
 
-const titleOf = (group) => (["model", "floor"].includes(group.part) ? factsOf(group.part, group.name).title : group.title);
+const titleOf = ({ part, name, title }) =>
+  (["model", "floor"].includes(part) ? factsOf(part, name).title : title);
 
-/** Return the element of the fields of a group that are not folded; `sources` are those of the values of a construction. */
-function groupElement(group, handlers, sources = {}) {
-  const fields = group.fields.filter((field) => isUsed(field) && !field.advanced).map((field) => fieldElement(field, handlers, sources[field.name]));
+/** Return the element of the fields of a group, empty without any; `sources` are of their values. */
+function groupElement(group, handlers, sources, advanced = false) {
+  const fields = group.fields.filter((field) => isUsed(field) && field.advanced === advanced)
+    .map((field) => fieldElement(field, handlers, sources?.[field.name]));
   return fields.length ? element("fieldset", {}, element("legend", {}, titleOf(group)), ...fields) : "";
 }
 
 let isUnfolded = false;
 
 /** Return the element of the folded fields of groups. */
-function foldedElement(groups, handlers, sources = {}) {
-  const parts = groups.map((group) => [group, group.fields.filter((field) => isUsed(field) && field.advanced)]).filter(([, fields]) => fields.length);
-  const result = element("details", { open: isUnfolded, class: "folded" }, element("summary", {}, `More: ${parts.map(([group]) => titleOf(group).toLowerCase()).join(", ")}`),
-    ...parts.map(([group, fields]) => element("fieldset", {}, element("legend", {}, titleOf(group)), ...fields.map((field) => fieldElement(field, handlers, sources[field.name])))));
+function foldedElement(groups, handlers, sources) {
+  const parts = groups.map((group) => groupElement(group, handlers, sources, true)).filter(Boolean);
+  const titles = parts.map((part) => part.querySelector("legend").textContent.toLowerCase());
+  const result = element("details", { open: isUnfolded, class: "folded" },
+    element("summary", {}, `More: ${titles.join(", ")}`), ...parts);
   result.addEventListener("toggle", () => { isUnfolded = result.open; });
   return result;
 }
@@ -259,37 +290,38 @@ function foldedElement(groups, handlers, sources = {}) {
 function fieldElement(field, handlers, source) {
   const id = `${field.group}.${field.name}`;
   const onInput = (value) => {
-    const changesFields = about.form.some(({ fields }) => fields.some((other) => switchOf(other) === field));
+    const changesFields = allFields().some((other) => switchOf(other) === field);
     setValue(field, value);
-    byId(`${id}.help`).textContent = helpOf(field);
     if (changesFields) handlers.rebuild();
     else handlers.onChange();
     showChoices();
   };
-  const newInputs = { choice: plainInput, flag: plainInput, list: listInput, text: plainInput }[field.kind] ?? numberInput;
+  const { kind, label, unit, help } = field;
+  const newInputs = { real: numberInput, whole: numberInput, list: listInput }[kind] ?? plainInput;
   const inputs = newInputs(field, id, onInput, handlers);
-  const { label, unit } = field;
   for (const input of inputs) input.setAttribute("aria-describedby", `${id}.help ${id}.error`);
-  return element("div", { class: "field" }, element("label", { for: id }, unit ? `${label}, ${unit}` : label), ...inputs,
-    element("p", { class: "help", id: `${id}.help` }, source ? `${helpOf(field)} Source of the value: ${source}.` : helpOf(field)),
+  const texts = [`${help}.`];
+  if (kind === "list") texts.push("Blanks or semicolons separate values; 24,5 is 24.5.");
+  if (source) texts.push(`Source of the value: ${source}.`);
+  return fieldRow(id, unit ? `${label}, ${unit}` : label, ...inputs,
+    element("p", { class: "help", id: `${id}.help` }, texts.join(" ")),
     element("p", { class: "error", id: `${id}.error` }));
 }
 
-const helpOf = ({ help, kind }) => `${help}.${kind === "list" ? " Blanks or semicolons separate values; 24,5 is 24.5." : ""}`;
-
 /** Show which preset or construction the form has. */
 function showChoices() {
-  for (const preset of balls()) byId(`preset_${preset.name}`)?.setAttribute("aria-pressed", String(isChosen(preset)));
+  for (const preset of balls())
+    byId(`preset_${preset.name}`)?.setAttribute("aria-pressed", String(isChosen(preset)));
   if (!byId("construction")) return;
   const construction = findConstruction();
   byId("construction").value = construction?.name ?? "";
-  byId("construction_text").textContent = construction?.text ?? "Changed values of a floor.";
+  byId("construction_text").textContent = textOfConstruction(construction);
 }
 
 /** Return the input of a choice, a flag or a text. */
 function plainInput({ kind, choices, ...field }, id, onInput) {
-  const options = Object.entries(choices).map(([value, text]) => element("option", { value }, capitalize(text)));
-  const input = kind === "choice" ? element("select", { id }, ...options)
+  const options = Object.entries(choices).map(([value, text]) => [value, capitalize(text)]);
+  const input = kind === "choice" ? select({ id }, options)
     : element("input", { id, type: kind === "flag" ? "checkbox" : "text" });
   const property = kind === "flag" ? "checked" : "value";
   input[property] = valueOf(field);
@@ -297,7 +329,7 @@ function plainInput({ kind, choices, ...field }, id, onInput) {
   return [input];
 }
 
-/** Call a function when an input is left after typing, with true, and after a pause of typing, with false. */
+/** Call a function when an input is left, with true, and after a pause of typing, with false. */
 export function listenToTyping(input, act) {
   let timer = 0;
   input.addEventListener("input", () => {
@@ -313,7 +345,7 @@ export function listenToTyping(input, act) {
 /** Return whether a field of the form has a text that is not its value. */
 export const isTyping = () => Boolean(document.querySelector("#inputs [data-typed]"));
 
-/** Take over what is typed into an input: `read` returns its value, undefined if it has none; `send` takes it and `show` shows it. */
+/** Take over what is typed into an input: `read` returns its value, undefined if it has none. */
 function takeTyping(input, { read, isTaken, send, show, problem }, { onTyping, onInvalid }) {
   input.addEventListener("input", () => {
     input.toggleAttribute("data-typed", !isTaken());
@@ -324,7 +356,7 @@ function takeTyping(input, { read, isTaken, send, show, problem }, { onTyping, o
     if (!input.hasAttribute("data-typed")) { if (isLeft) show(); return; }
     const value = read(input.value);
     if (value === undefined) {
-      if (isLeft && !input.hasAttribute("aria-invalid")) onInvalid(input.id, problem(input.value));
+      if (isLeft && !input.ariaInvalid) onInvalid(input.id, problem(input.value));
       return;
     }
     input.removeAttribute("data-typed");
@@ -343,7 +375,8 @@ function listInput(field, id, onInput, handlers) {
   takeTyping(text, {
     read, show, isTaken: () => isSame(read(text.value), [valueOf(field)].flat()),
     send: (numbers, isLeft) => { onInput(numbers); if (isLeft) show(); },
-    problem: (list) => `${field.label}: “${list}” is not a list of numbers; blanks or semicolons separate them`,
+    problem: (list) =>
+      `${field.label}: “${list}” is not a list of numbers; blanks or semicolons separate them`,
   }, handlers);
   return [text];
 }
@@ -353,32 +386,35 @@ function numberInput(field, id, onInput, handlers) {
   // A zero that is not a number, such as "none", is an empty field.
   const { zero } = field;
   const textOf = (value) => (zero && value === 0 ? "" : String(Number(value.toPrecision(DIGITS))));
-  const number = element("input", { id, type: "text", inputmode: "decimal", value: textOf(current), placeholder: zero, class: `number${zero ? " open" : ""}` });
+  const number = element("input", {
+    id, type: "text", inputmode: "decimal", value: textOf(current), placeholder: zero,
+    class: `number${zero ? " open" : ""}`,
+  });
   const take = (entered) => {
     current = entered;
     slider?.moveTo(entered);
   };
-  number.show = (entered) => {
+  const send = (entered) => {
     number.removeAttribute("data-typed");
     number.value = textOf(entered);
     take(entered);
-  };
-  number.send = (entered) => {
-    number.show(entered);
     onInput(scaled(entered, field.power));
   };
   const read = (text) => {
     const entered = zero && !text.trim() ? 0 : numberOf(text);
     return Number.isNaN(entered) ? undefined : entered;
   };
-  const { send } = number;
   const { step } = field;
   const slider = field.slider && step ? sliderInput(field, current, send) : null;
   takeTyping(number, {
     read, isTaken: () => number.value === textOf(current) || read(number.value) === current,
     show: () => { number.value = textOf(current); },
     // The text remains as it is while it is typed.
-    send: (entered, isLeft) => { if (isLeft) send(entered); else { take(entered); onInput(scaled(entered, field.power)); } },
+    send: (entered, isLeft) => {
+      if (isLeft) { send(entered); return; }
+      take(entered);
+      onInput(scaled(entered, field.power));
+    },
     problem: (text) => `${field.label}: ${numberProblem(text, field.unit)}`,
   }, handlers);
   number.addEventListener("keydown", (event) => {
@@ -387,7 +423,8 @@ function numberInput(field, id, onInput, handlers) {
     event.preventDefault();
     // To the next round number.
     const ratio = (read(number.value) ?? current) / step;
-    const next = rounding((steps > 0 ? Math.floor(ratio + 1e-6) : Math.ceil(ratio - 1e-6)) + steps, step);
+    const last = steps > 0 ? Math.floor(ratio + 1e-6) : Math.ceil(ratio - 1e-6);
+    const next = rounding(last + steps, step);
     if (next >= (field.lower ?? -Infinity) && next <= (field.upper ?? Infinity)) send(next);
   });
   return slider ? [number, slider] : [number];
@@ -401,7 +438,8 @@ function sliderInput({ slider: { ends }, step, lower, upper, label, unit }, valu
   // A model or a construction may have brought a value near the end for the default.
   const low = Math.min(ends[0], Math.max(value / 2, lower ?? 0));
   const high = Math.max(ends[1], Math.min(2 * value, upper ?? Infinity));
-  const [min, max] = [Math.ceil(low / step - 1e-6), Math.floor(high / step + 1e-6)].map((count) => rounding(count, step));
+  const min = rounding(Math.ceil(low / step - 1e-6), step);
+  const max = rounding(Math.floor(high / step + 1e-6), step);
   const slider = element("input", { type: "range", "aria-label": label, min, max, step });
   slider.moveTo = (selected) => {
     slider.value = selected;
@@ -417,7 +455,8 @@ export const invalidField = () => document.querySelector("#inputs [aria-invalid]
 
 /** Mark only one field as invalid, with a sentence below it; none without a name. */
 export function markField(name, message = "") {
-  for (const input of document.querySelectorAll("#panel [aria-invalid]")) input.removeAttribute("aria-invalid");
+  for (const input of document.querySelectorAll("#panel [aria-invalid]"))
+    input.removeAttribute("aria-invalid");
   for (const error of document.querySelectorAll("#panel .error")) error.textContent = "";
   const input = name && (byId(name) ?? byId(`recording_${name}`));
   if (!input) return;

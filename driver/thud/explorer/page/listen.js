@@ -1,7 +1,7 @@
 // Sound in the room below: a button for each variant with a room, and a player.
-import { button, byId } from "./page.js";
-import { swatch } from "./plot.js";
-import { ask } from "./request.js";
+import { button, byId } from "thud/page.js";
+import { swatch } from "thud/plot.js";
+import { ask } from "thud/request.js";
 
 const NOTE = "Computed, not recorded: no measured room, no furniture, no listener's head; 50 to 630 Hz. The levels of all variants have the same scale: set the volume for the loudest.";
 // Address and full scale, Pa, of each downloaded sound by the text of its case.

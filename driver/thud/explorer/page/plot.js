@@ -1,5 +1,5 @@
-// Plots of curves against numbers or bands, with limits, and bars of ranges; drawn at the size of their element.
-import { svgElement, element, minus, rounded } from "./page.js";
+// Plots of curves against numbers or bands, with limits, and bars.
+import { element, minus, rounded, setUp, svgElement } from "thud/page.js";
 
 const MARKS = [
   (x, y) => svgElement("circle", { cx: x, cy: y, r: 4 }),
@@ -17,10 +17,10 @@ const watcher = new ResizeObserver((entries) => entries.forEach((entry) => redra
 
 /** Draw a plot in an element.
  *
- * `content` has a title and either `rows` of bars, [title, low, high], or `curves`. These have name,
+ * `content` has a title and either `rows` of bars, [title, value], or `curves`. These have name,
  * style, x, y and the options `marks`, `thin` and `ends` ([low, high] of each value). The axes `x`
- * and `y` have a title and a unit; `x.bands` is a list of names of bands. `limits` are [lower, upper]
- * of each band, and `results` are those of the first curve. With `hasCursor` the first
+ * and `y` have a title and a unit; `x.bands` is a list of names of bands. `limits` are [lower,
+ * upper] of each band, and `results` are those of the first curve. With `hasCursor` the first
  * curve has the cursor of `setCursor`.
  */
 export function plot(host, content) {
@@ -35,35 +35,26 @@ export function contentOf(host) {
   return drawn.get(host)?.content;
 }
 
-/** Show a vertical line at a position of the x axis with a mark on the first curve; null hides it. */
+/** Show a line at a position of the x axis with a mark on the first curve; null hides it. */
 export function setCursor(host, at) {
   const entry = drawn.get(host);
   if (!entry) return;
   entry.at = at;
   const { content, drawing } = entry;
   if (!drawing?.moment || !content.hasCursor) return;
-  const curve = content.curves[0];
-  const isInside = at !== null && curve && at >= drawing.across[0] && at <= drawing.across[1];
-  drawing.moment.setAttribute("visibility", isInside ? "visible" : "hidden");
+  const [{ x, y }] = content.curves;
+  const isInside = at !== null && at >= x[0] && at <= x.at(-1);
+  setUp(drawing.moment, { visibility: isInside ? "visible" : "hidden" });
   if (!isInside) return;
   const [line, dot] = drawing.moment.children;
-  line.setAttribute("x1", drawing.toX(at));
-  line.setAttribute("x2", drawing.toX(at));
-  dot.setAttribute("cx", drawing.toX(at));
-  dot.setAttribute("cy", drawing.toY(interpolate(curve.x, curve.y, at)));
+  setUp(line, { x1: drawing.toX(at), x2: drawing.toX(at) });
+  setUp(dot, { cx: drawing.toX(at), cy: drawing.toY(y[nearest(x, at)]) });
 }
 
-/** Return the value of a curve at a position, linearly interpolated, 0 outside. */
-export function interpolate(x, y, at) {
-  let [low, high] = [0, x.length - 1];
-  if (!(at >= x[low] && at <= x[high])) return 0;
-  while (high - low > 1) {
-    const middle = (low + high) >> 1;
-    if (x[middle] <= at) low = middle;
-    else high = middle;
-  }
-  const part = high === low ? 0 : (at - x[low]) / (x[high] - x[low]);
-  return y[low] + part * (y[high] - y[low]);
+/** Return the index of the value that is nearest to another. */
+function nearest(values, at) {
+  const distance = (i) => Math.abs(values[i] - at);
+  return values.reduce((best, _, i) => (distance(i) < distance(best) ? i : best), 0);
 }
 
 /** Return a short line in the style of a curve, for legends, with its mark if it has marks. */
@@ -73,16 +64,16 @@ export function swatch(style, hasMarks = false) {
   return svgElement("svg", { width: 26, height: 12, "aria-hidden": "true", class: "swatch" }, line);
 }
 
-/** Return the image of a content with a width and a height, with a legend of several curves, for files. */
+/** Return the image of a content with a legend of several curves, for files. */
 export function imageOf(content, width, height) {
   const { image } = draw(content, width, height);
-  const names = (content.curves ?? []).map((curve) => [curve.name, curve.style]);
-  if (names.length < 2) return image;
-  image.setAttribute("height", height + LINE * names.length + 6);
-  for (const [i, [name, style]] of names.entries()) {
+  const { curves = [] } = content;
+  if (curves.length < 2) return image;
+  setUp(image, { height: height + LINE * curves.length + 6 });
+  for (const [i, { name, style }] of curves.entries()) {
     const y = height + LINE * i + 12;
-    image.append(svgElement("g", { class: `curve style${style % STYLES}` }, svgElement("path", { d: `M50 ${y - 4}h26` })),
-      svgElement("text", { x: 82, y }, name));
+    const line = svgElement("path", { d: `M50 ${y - 4}h26` });
+    image.append(svgElement("g", { class: `curve style${style % STYLES}` }, line), text(82, y, name));
   }
   return image;
 }
@@ -103,34 +94,51 @@ function draw(content, width, height) {
   return content.rows ? drawBars(content, width, height) : drawCurves(content, width, height);
 }
 
+/** Return an empty image with a description. */
+function newImage(width, height, description) {
+  const viewBox = `0 0 ${width} ${height}`;
+  return svgElement("svg", { width, height, viewBox, role: "img", "aria-label": description });
+}
+
+/** Return a text that begins, has its middle or ends at a position. */
+const text = (x, y, content, anchor = "start", attributes = {}) =>
+  svgElement("text", { x, y, "text-anchor": anchor, ...attributes }, content);
+const quiet = (...values) => setUp(text(...values), { class: "quiet" });
+const line = (name, x1, x2, y1, y2) => svgElement("line", { class: name, x1, x2, y1, y2 });
+const titleOf = ({ title, unit, reference = "" }) => `${title}, ${unit}${reference}`;
+
 function drawCurves(content, width, height) {
-  const across = content.x.bands ? [-0.5, content.x.bands.length - 0.5] : rangeOf(content.curves.map((curve) => curve.x));
-  const values = content.curves.flatMap((curve) => [curve.y, ...(curve.ends ?? [])]);
-  const up = padded(rangeOf([...values, (content.limits ?? []).flat(), content.y.zero ? [0] : []]));
+  const { curves, limits = [], results = [], x: { bands } } = content;
+  const across = bands ? [-0.5, bands.length - 0.5] : rangeOf(curves.map(({ x }) => x));
+  const values = curves.flatMap(({ y, ends = [] }) => [y, ...ends]);
+  const up = padded(rangeOf([...values, limits.flat(), content.y.zero ? [0] : []]));
   const marksUp = ticks(up, height / 40);
   const left = 10 + LETTER * Math.max(...marksUp.map((mark) => minus(mark).length));
   const box = { left, right: width - 10, top: 24, bottom: height - 36 };
-  const toX = (value) => box.left + ((value - across[0]) / (across[1] - across[0])) * (box.right - box.left);
+  const toX = (value) => left + ((value - across[0]) / (across[1] - across[0])) * (box.right - left);
   const toY = (value) => box.bottom - ((value - up[0]) / (up[1] - up[0])) * (box.bottom - box.top);
-  const image = svgElement("svg", { width, height, viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": describeCurves(content) });
-  for (const [i, [lower, upper]] of (content.limits ?? []).entries())
-    image.append(svgElement("rect", { class: `limits ${content.results?.[i] ?? ""}`, x: toX(i - 0.38), width: toX(0.76) - toX(0), y: toY(upper), height: toY(lower) - toY(upper) }));
+  const image = newImage(width, height, describeCurves(content));
+  image.append(...limits.map(([lower, upper], i) => svgElement("rect", {
+    class: `limits ${results[i] ?? ""}`, x: toX(i - 0.38), width: toX(0.76) - toX(0), y: toY(upper),
+    height: toY(lower) - toY(upper),
+  })));
   for (const value of marksUp) {
-    image.append(svgElement("line", { class: value === 0 ? "axis" : "grid", x1: box.left, x2: box.right, y1: toY(value), y2: toY(value) }));
-    image.append(svgElement("text", { class: "quiet", x: box.left - 5, y: toY(value) + 4, "text-anchor": "end" }, minus(value)));
+    const y = toY(value);
+    image.append(line(value === 0 ? "axis" : "grid", left, box.right, y, y));
+    image.append(quiet(left - 5, y + 4, minus(value), "end"));
   }
-  const marksAcross = content.x.bands ? content.x.bands.map((_, i) => i) : ticks(across, (box.right - box.left) / 60);
+  const marksAcross = bands?.map((_, i) => i) ?? ticks(across, (box.right - left) / 60);
   // If the names of bands do not fit, only every second, third … name is shown.
-  const spacing = (box.right - box.left) / marksAcross.length;
-  const every = content.x.bands ? Math.ceil((LETTER * Math.max(...content.x.bands.map((name) => name.length)) + 6) / spacing) : 1;
+  const longest = LETTER * Math.max(0, ...(bands ?? []).map((name) => name.length)) + 6;
+  const every = bands ? Math.ceil((longest * bands.length) / (box.right - left)) : 1;
   for (const [i, value] of marksAcross.entries()) {
-    if (!content.x.bands) image.append(svgElement("line", { class: "grid", x1: toX(value), x2: toX(value), y1: box.top, y2: box.bottom }));
-    if (i % every === 0) image.append(svgElement("text", { class: "quiet", x: toX(value), y: box.bottom + 16, "text-anchor": "middle" }, content.x.bands?.[i] ?? minus(value)));
+    const x = toX(value);
+    if (!bands) image.append(line("grid", x, x, box.top, box.bottom));
+    if (i % every === 0) image.append(quiet(x, box.bottom + 16, bands?.[i] ?? minus(value), "middle"));
   }
-  image.append(svgElement("text", { class: "quiet", x: box.right, y: height - 5, "text-anchor": "end" }, `${content.x.title}, ${content.x.unit}`));
-  image.append(svgElement("text", { class: "quiet", x: 2, y: 13 }, `${content.y.title}, ${content.y.unit}${content.y.reference ?? ""}`));
+  image.append(quiet(box.right, height - 5, titleOf(content.x), "end"), quiet(2, 13, titleOf(content.y)));
   // The first curve is drawn over the others.
-  for (const curve of [...content.curves].reverse()) image.append(curveElement(curve, toX, toY));
+  image.append(...curves.map((curve) => curveElement(curve, toX, toY)).reverse());
   const moment = svgElement("g", { class: "moment", visibility: "hidden" },
     svgElement("line", { y1: box.top, y2: box.bottom }), svgElement("circle", { r: 4.5 }));
   image.append(moment);
@@ -138,42 +146,45 @@ function drawCurves(content, width, height) {
 }
 
 function curveElement(curve, toX, toY) {
-  const points = curve.x.map((x, i) => [x, curve.y[i]]).filter(([, y]) => y !== null);
-  const line = points.map(([x, y]) => `${toX(x).toFixed(1)} ${toY(y).toFixed(1)}`).join("L");
-  const group = svgElement("g", { class: `curve style${curve.style % STYLES}${curve.thin ? " thin" : ""}` }, svgElement("path", { d: `M${line}` }));
-  for (const [i, ends] of (curve.ends ?? []).entries())
-    if (ends.length) group.append(svgElement("path", { class: "bar", d: `M${toX(curve.x[i])} ${toY(ends[0])}V${toY(ends[1])}m-4 0h8M${toX(curve.x[i]) - 4} ${toY(ends[0])}h8` }));
-  if (curve.marks) for (const [x, y] of points) group.append(MARKS[curve.style % MARKS.length](toX(x), toY(y)));
+  const points = curve.x.map((x, i) => [toX(x), curve.y[i]]).filter(([, y]) => y !== null)
+    .map(([x, y]) => [x, toY(y)]);
+  const way = points.map(([x, y]) => `${x.toFixed(1)} ${y.toFixed(1)}`).join("L");
+  const style = `curve style${curve.style % STYLES}${curve.thin ? " thin" : ""}`;
+  const group = svgElement("g", { class: style }, svgElement("path", { d: `M${way}` }));
+  for (const [i, [low, high]] of (curve.ends ?? []).entries()) {
+    if (low === undefined) continue;
+    const [x, bottom, top] = [toX(curve.x[i]), toY(low), toY(high)];
+    const d = `M${x} ${bottom}V${top}m-4 0h8M${x - 4} ${bottom}h8`;
+    group.append(svgElement("path", { class: "bar", d }));
+  }
+  if (curve.marks) group.append(...points.map(([x, y]) => MARKS[curve.style % MARKS.length](x, y)));
   return group;
 }
 
 function drawBars(content, width, height) {
-  const [low, high] = padded(rangeOf([...content.rows.map(([, ...ends]) => ends), [0]]));
+  const { rows } = content;
+  const [low, high] = padded(rangeOf([rows.map(([, value]) => value), [0]]));
   const isWide = width > 480;
-  const left = isWide ? 14 + LETTER * Math.max(...content.rows.map(([title]) => title.length)) : 14;
+  const left = isWide ? 14 + LETTER * Math.max(...rows.map(([title]) => title.length)) : 14;
   const toX = (value) => left + ((value - low) / (high - low)) * (width - 50 - left);
-  const room = (height - 44) / content.rows.length;
-  const image = svgElement("svg", { width, height, viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": describeRows(content) });
+  const room = (height - 44) / rows.length;
+  const image = newImage(width, height, `${content.title}, ${content.x.unit}. ${rows.map(
+    ([title, value]) => `${title} ${value.toFixed(1)}`).join("; ")}`);
   for (const value of ticks([low, high], (width - left) / 60)) {
-    image.append(svgElement("line", { class: value === 0 ? "axis" : "grid", x1: toX(value), x2: toX(value), y1: 4, y2: height - 36 }));
-    image.append(svgElement("text", { class: "quiet", x: toX(value), y: height - 20, "text-anchor": "middle" }, minus(value)));
+    image.append(line(value === 0 ? "axis" : "grid", toX(value), toX(value), 4, height - 36));
+    image.append(quiet(toX(value), height - 20, minus(value), "middle"));
   }
-  for (const [i, [title, from, to]] of content.rows.entries()) {
-    const y = 6 + room * i;
-    const bar = isWide ? { y: y + room * 0.2, height: Math.min(room * 0.6, 20) } : { y: y + 15, height: Math.max(4, Math.min(room - 20, 12)) };
-    image.append(svgElement("text", isWide ? { x: left - 8, y: bar.y + bar.height / 2 + 4, "text-anchor": "end" } : { x: 2, y: y + 11 }, title));
-    image.append(svgElement("rect", { class: "range", x: toX(Math.min(from, to)), width: Math.max(1.5, Math.abs(toX(to) - toX(from))), ...bar }));
-    image.append(svgElement("text", { class: "quiet", x: toX(Math.max(from, to, 0)) + 5, y: bar.y + bar.height / 2 + 4 }, spread(from, to)));
+  for (const [i, [title, value]] of rows.entries()) {
+    const top = 6 + room * i + (isWide ? room * 0.2 : 15);
+    const size = isWide ? Math.min(room * 0.6, 20) : Math.max(4, Math.min(room - 20, 12));
+    const middle = top + size / 2 + 4;
+    const bar = { x: toX(0), width: Math.max(1.5, toX(value) - toX(0)), y: top, height: size };
+    image.append(isWide ? text(left - 8, middle, title, "end") : text(2, top - 4, title));
+    image.append(svgElement("rect", { class: "range", ...bar }));
+    image.append(quiet(toX(value) + 5, middle, value.toFixed(1)));
   }
-  image.append(svgElement("text", { class: "quiet", x: width - 10, y: height - 4, "text-anchor": "end" }, `${content.x.title}, ${content.x.unit}`));
+  image.append(quiet(width - 10, height - 4, titleOf(content.x), "end"));
   return { image };
-}
-
-/** Return the text of a range around zero. */
-function spread(low, high) {
-  const [from, to] = [low, high].map((value) => Math.abs(value).toFixed(1));
-  if (from === to) return `±${to}`;
-  return [low, high].filter((value) => Math.abs(value) >= 0.05).map((value) => `${value < 0 ? "−" : "+"}${Math.abs(value).toFixed(1)}`).join(", ") || "±0.0";
 }
 
 /** Show the values of all curves at the pointer. */
@@ -181,41 +192,36 @@ function showValuesAtPointer({ content, drawing }, image, readout) {
   const { across, box, toX } = drawing;
   const cursor = svgElement("line", { class: "cursor", y1: box.top, y2: box.bottom, visibility: "hidden" });
   image.append(cursor);
-  image.addEventListener("pointermove", (event) => {
-    const at = across[0] + ((event.offsetX - box.left) / (box.right - box.left)) * (across[1] - across[0]);
-    const isInside = event.offsetX >= box.left && event.offsetX <= box.right;
+  image.addEventListener("pointermove", ({ offsetX }) => {
+    const { left, right } = box;
+    const at = across[0] + ((offsetX - left) / (right - left)) * (across[1] - across[0]);
+    const isInside = offsetX >= left && offsetX <= right;
     if (isInside) showValues(content, at, readout);
-    const x = content.x.bands ? toX(Math.round(at)) : event.offsetX;
-    cursor.setAttribute("x1", x);
-    cursor.setAttribute("x2", x);
-    cursor.setAttribute("visibility", isInside ? "visible" : "hidden");
+    const x = content.x.bands ? toX(Math.round(at)) : offsetX;
+    setUp(cursor, { x1: x, x2: x, visibility: isInside ? "visible" : "hidden" });
     readout.hidden = !isInside;
     // On the side of the plot away from the cursor.
-    readout.classList.toggle("left", event.offsetX > (box.left + box.right) / 2);
+    readout.classList.toggle("left", offsetX > (left + right) / 2);
   });
-  image.addEventListener("pointerleave", () => { readout.hidden = true; cursor.setAttribute("visibility", "hidden"); });
+  image.addEventListener("pointerleave", () => {
+    readout.hidden = true;
+    setUp(cursor, { visibility: "hidden" });
+  });
 }
 
-function showValues(content, at, readout) {
-  const position = content.x.bands ? content.x.bands[Math.min(content.x.bands.length - 1, Math.max(0, Math.round(at)))] : rounded(at);
-  const lines = content.curves.map((curve) => {
-    const nearest = curve.x.reduce((best, x, i) => (Math.abs(x - at) < Math.abs(curve.x[best] - at) ? i : best), 0);
-    return element("div", {}, swatch(curve.style, curve.marks), ` ${rounded(curve.y[nearest], content.y.unit)}`);
-  });
-  readout.replaceChildren(`${position} ${content.x.unit}`, ...lines);
+function showValues({ curves, x: { bands, unit }, y }, at, readout) {
+  const band = bands && Math.min(bands.length - 1, Math.max(0, Math.round(at)));
+  const lines = curves.map((curve) => element("div", {}, swatch(curve.style, curve.marks),
+    ` ${rounded(curve.y[nearest(curve.x, at)], y.unit)}`));
+  readout.replaceChildren(`${bands ? bands[band] : rounded(at)} ${unit}`, ...lines);
 }
 
 /** Return a description of a plot for screen readers. */
-function describeCurves(content) {
-  const lines = content.curves.map((curve) => {
-    if (content.x.bands) return `${curve.name}: ${curve.y.map((y, i) => `${content.x.bands[i]} ${content.x.unit} ${rounded(y)}`).join(", ")}`;
-    return `${curve.name}: maximum ${rounded(Math.max(...curve.y))}`;
-  });
-  return `${content.y.title}, ${content.y.unit}. ${lines.join("; ")}`;
-}
-
-function describeRows(content) {
-  return `${content.title}, ${content.x.unit}. ${content.rows.map(([title, low, high]) => `${title} ${spread(low, high)}`).join("; ")}`;
+function describeCurves({ curves, x: { bands, unit }, y: axis }) {
+  const lines = curves.map(({ name, y }) => `${name}: ${bands
+    ? y.map((value, i) => `${bands[i]} ${unit} ${rounded(value)}`).join(", ")
+    : `maximum ${rounded(Math.max(...y))}`}`);
+  return `${axis.title}, ${axis.unit}. ${lines.join("; ")}`;
 }
 
 function rangeOf(lists) {
@@ -234,6 +240,7 @@ function ticks([low, high], count) {
   const power = 10 ** Math.floor(Math.log10(rough));
   const step = power * [1, 2, 5, 10].find((factor) => factor * power >= rough * (1 - 1e-9));
   const values = [];
-  for (let i = Math.ceil(low / step - 1e-9); i * step <= high + 1e-9 * step; i += 1) values.push(Number((i * step).toPrecision(12)));
+  const [first, last] = [Math.ceil(low / step - 1e-9), Math.floor(high / step + 1e-9)];
+  for (let i = first; i <= last; i += 1) values.push(Number((i * step).toPrecision(12)));
   return values;
 }

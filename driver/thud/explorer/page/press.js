@@ -1,7 +1,8 @@
 // The curve of a press, from which the modulus of the ball is fitted.
-import { element, fileZone } from "./page.js";
+import { element, fileZone } from "thud/page.js";
 
-const HELP = "Deflection and force on the loading branch, with units in the titles, such as “Deflection, mm” and “Force, N”";
+const HELP = "Deflection and force on the loading branch, with units in the titles, such as "
+  + "“Deflection, mm” and “Force, N”";
 
 /** Return the folded choice of a file; `onPress` is called with the form to fit and its name. */
 export function pressInputs(onPress) {
@@ -13,9 +14,8 @@ export function pressInputs(onPress) {
   const zone = fileZone(
     {
       id: "press_zone", input: "press_file", title: "Drop the curve of a press here",
-      label: "Choose file", accept: ".csv,.txt,.tsv,.dat,.xlsx",
-    },
-    element("p", { class: "help" }, HELP), take);
+      accept: ".csv,.txt,.tsv,.dat,.xlsx",
+    }, HELP, take);
   zone.addEventListener("drop", (event) => {
     // It is no recording.
     event.preventDefault();

@@ -1,7 +1,10 @@
 // The door of a recording: its files, what they do not say, and what its answer asks for.
-import { button, byId, element, fileZone, numberOf, numberProblem } from "./page.js";
-import { about, buildInputs, listenToTyping, state } from "./form.js";
-import { ServerError } from "./request.js";
+import { button, byId, element, fieldRow, fileZone, numberOf, numberProblem, select } from "thud/page.js";
+import { about, buildInputs, listenToTyping, state } from "thud/form.js";
+import { ServerError } from "thud/request.js";
+
+const FILES_HELP = "One file, or the drops of one measurement: WAV, FLAC, CSV, HDF5, UFF 58, "
+  + "MATLAB or TDMS; with it the laboratory’s TOML file";
 
 /** Files of the recording, drops of one measurement. */
 export const recording = { files: [] };
@@ -10,14 +13,15 @@ const asked = element("div", { id: "asks", role: "group", "aria-label": "Missing
 
 /** Return what is stated, numbers as the server reads them, and the files. */
 export function recordingRequest() {
-  const values = Object.fromEntries(about.recording.filter(({ name }) => name in state.recording).map(({ name, kind }) => {
-    const number = kind === "number" ? numberOf(state.recording[name]) : NaN;
-    return [name, Number.isNaN(number) ? state.recording[name] : String(number)];
-  }));
+  const values = { ...state.recording };
+  for (const { name, kind } of about.recording) {
+    const number = kind === "number" && name in values ? numberOf(values[name]) : NaN;
+    if (!Number.isNaN(number)) values[name] = String(number);
+  }
   return { values, files: recording.files };
 }
 
-/** Take over the text of a field, and show it in its inputs but for the one in which it was typed. */
+/** Take over the text of a field, and show it in its other inputs. */
 function setStated(name, text, source) {
   if (text.trim()) state.recording[name] = text;
   else delete state.recording[name];
@@ -34,16 +38,20 @@ export function keepStated() {
   state.earlier = Object.keys(state.recording);
 }
 
-/** Build the form of the recording; `onChange` is called when it has to be assessed again, `onTyping` while a field is typed. */
+/** Build the form of the recording; its handlers are those of `buildInputs`. */
 function buildRecording(handlers) {
   const { onChange } = handlers;
-  const fields = (folded) => about.recording.filter((field) => field.folded === folded).map((field) => recordingField(field, handlers));
+  const fields = (folded) => about.recording.filter((field) => field.folded === folded)
+    .map((field) => recordingField(field, handlers));
   byId("inputs").replaceChildren(
-    fileZone({ id: "drop_zone", input: "file", title: "Drop the files of a force plate here", label: "Choose files", multiple: true },
-      element("p", { class: "help" }, "One file, or the drops of one measurement: WAV, FLAC, CSV, HDF5, UFF 58, MATLAB or TDMS; with it the laboratory’s TOML file"), (files) => addFiles(files, onChange)),
+    fileZone(
+      { id: "drop_zone", input: "file", title: "Drop the files of a force plate here", multiple: true },
+      FILES_HELP, (files) => addFiles(files, onChange)),
     element("ul", { id: "files", "aria-label": "Files" }), asked,
-    element("fieldset", {}, element("legend", {}, "What the file does not say"), element("p", { id: "earlier", class: "help" }), ...fields(false)),
-    element("details", { class: "folded" }, element("summary", {}, "Uncertainties, filter, report"), ...fields(true)));
+    element("fieldset", {}, element("legend", {}, "What the file does not say"),
+      element("p", { id: "earlier", class: "help" }), ...fields(false)),
+    element("details", { class: "folded" },
+      element("summary", {}, "Uncertainties, filter, report"), ...fields(true)));
   showFiles(onChange);
   showEarlier(handlers);
 }
@@ -59,9 +67,11 @@ function showEarlier(handlers) {
     byId("recording_height").focus();
     handlers.onChange();
   };
-  const labels = about.recording.filter(({ name }) => state.earlier.includes(name)).map(({ label, name }) => `${label}: ${state.recording[name]}`);
+  const labels = about.recording.filter(({ name }) => state.earlier.includes(name))
+    .map(({ label, name }) => `${label}: ${state.recording[name]}`);
   byId("earlier").hidden = !labels.length;
-  byId("earlier").replaceChildren(`Kept from the last recording: ${labels.join("; ")}. `, button("Clear", clearEarlier, { id: "clear_earlier" }));
+  byId("earlier").replaceChildren(`Kept from the last recording: ${labels.join("; ")}. `,
+    button("Clear", clearEarlier, { id: "clear_earlier" }));
 }
 
 export function addFiles(files, onChange) {
@@ -74,8 +84,8 @@ export function addFiles(files, onChange) {
 export const isLaboratory = ({ name }) => /\.toml$/i.test(name);
 
 function showFiles(onChange) {
-  byId("files")?.replaceChildren(...recording.files.map((file) => element("li", {}, isLaboratory(file) ? `${file.name} (laboratory)` : file.name,
-    button("×", () => {
+  byId("files")?.replaceChildren(...recording.files.map((file) => element("li", {},
+    isLaboratory(file) ? `${file.name} (laboratory)` : file.name, button("×", () => {
       recording.files = recording.files.filter((other) => other !== file);
       if (!recording.files.length) keepStated();
       showEarlier();
@@ -85,60 +95,67 @@ function showFiles(onChange) {
     }, { class: "remove", "aria-label": `Remove ${file.name}` }))));
 }
 
-function recordingField({ name, label, kind, hint, choices }, { onChange, onTyping }) {
-  const id = `recording_${name}`;
-  const options = Object.entries({ "": "not known", ...choices }).map(([value, text]) => element("option", { value }, text));
+/** Return the input of a field with its text; what is typed is stated at once. */
+function newInput(id, { name, kind, hint, choices }, value, onTyping) {
   const isNumber = kind === "number";
-  const input = kind === "choice" ? element("select", { id }, ...options)
-    : element("input", { id, type: "text", placeholder: hint, class: isNumber && "number", inputmode: isNumber && "decimal", "aria-describedby": `${id}.error` });
-  input.value = state.recording[name] ?? "";
+  const input = kind === "choice" ? select({ id }, Object.entries({ "": "not known", ...choices }))
+    : element("input", { id, name, type: "text", placeholder: hint, class: isNumber && "number",
+      inputmode: isNumber && "decimal", "aria-describedby": `recording_${name}.error` });
+  input.value = value ?? "";
   // A file may be dropped while the field still has the focus.
   input.addEventListener("input", () => { setStated(name, input.value, input); onTyping(); });
-  listenToTyping(input, (isLeft) => {
-    const isValue = !isNumber || !input.value.trim() || !Number.isNaN(numberOf(input.value));
-    if (isLeft || isValue) onChange();
-  });
-  return element("div", { class: "field" }, element("label", { for: id }, label), input, element("p", { class: "error", id: `${id}.error` }));
+  return input;
 }
 
-/** Return the body of a request with the files and fields; throw ServerError for one that the server would refuse. */
+function recordingField(field, { onChange, onTyping }) {
+  const { name, label, kind } = field;
+  const id = `recording_${name}`;
+  const input = newInput(id, field, state.recording[name], onTyping);
+  listenToTyping(input, (isLeft) => {
+    const isNoNumber = kind === "number" && Number.isNaN(numberOf(input.value));
+    if (isLeft || !isNoNumber || !input.value.trim()) onChange();
+  });
+  return fieldRow(id, label, input, element("p", { class: "error", id: `${id}.error` }));
+}
+
+/** Return the body of a request; throw ServerError for one that the server would refuse. */
 export function recordingBody(values) {
   const { values: stated, files } = recordingRequest();
   const body = new FormData();
   if (values) body.set("case", JSON.stringify(values));
+  const refuse = (error, field) => { throw new ServerError({ error, field }); };
   for (const { name, label, kind } of about.recording.filter((field) => field.name in stated)) {
-    if (kind === "number" && Number.isNaN(numberOf(stated[name]))) throw new ServerError({ error: `${label}: ${numberProblem(stated[name])}`, field: name });
+    if (kind === "number" && Number.isNaN(numberOf(stated[name])))
+      refuse(`${label}: ${numberProblem(stated[name])}`, name);
     body.set(name, stated[name]);
   }
+  const limit = about.max_recording;
   for (const file of files) {
-    if (file.size > about.max_recording) throw new ServerError({ error: `${file.name} is larger than ${about.max_recording / 1e6} MB; allowed: less` });
+    if (file.size > limit) refuse(`${file.name} is larger than ${limit / 1e6} MB; allowed: less`);
     body.append("file", file);
   }
   return body;
 }
 
-/** Ask for what the answer lacks, with the values that it found or that were typed since; one button sends all. */
+/** Ask for what the answer lacks, with the values that it found or that were typed since. */
 export function showAsks(asks, { onChange, onTyping }) {
   const focus = asked.contains(document.activeElement) ? document.activeElement.id : "";
   // The last answer stands above on narrow screens.
   if (!asked.hidden && !asks.length && matchMedia("(max-width: 759px)").matches) scrollTo(0, 0);
   asked.hidden = !asks.length;
-  const cards = asks.map(({ reason, values }) => {
-    const fields = Object.keys(values).map((name) => about.recording.find((field) => field.name === name)).filter(Boolean);
-    const inputs = fields.map(({ name, label, kind, hint }) => {
-      const id = `ask_${name}`;
-      const isNumber = kind === "number";
-      const input = element("input", { id, name, type: "text", placeholder: hint, class: isNumber && "number", inputmode: isNumber && "decimal", value: state.recording[name] ?? values[name] });
-      input.addEventListener("input", () => { setStated(name, input.value, input); onTyping(); });
-      return element("div", { class: "field" }, element("label", { for: id }, label), input);
-    });
-    return element("div", {}, reason ? element("p", {}, reason) : "", ...inputs);
-  });
+  const rowOf = ([name, value]) => {
+    const field = about.recording.find((other) => other.name === name);
+    const id = `ask_${name}`;
+    return fieldRow(id, field.label, newInput(id, field, state.recording[name] ?? value, onTyping));
+  };
+  const cards = asks.map(({ reason, values }) => element("div", {},
+    reason ? element("p", {}, reason) : "", ...Object.entries(values).map(rowOf)));
   const send = () => {
     for (const { name, value } of asked.querySelectorAll("input")) setStated(name, value);
     onChange();
   };
-  asked.replaceChildren(...cards, ...(cards.length ? [button("Assess with this", send, { class: "strong", type: "submit", id: "assess" })] : []));
+  const sending = button("Assess with this", send, { class: "strong", type: "submit", id: "assess" });
+  asked.replaceChildren(...cards, sending);
   // After Enter the next value is missing.
   if (focus) (byId(focus) ?? asked.querySelector("input"))?.focus();
 }

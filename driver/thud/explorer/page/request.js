@@ -1,5 +1,5 @@
 // Requests to the server. Each has the token; long computations answer with a stream of reports.
-import { storeText, stored } from "./storage.js";
+import { storeText, stored } from "thud/storage.js";
 
 /** Error that the server reports; `field` is the field it is about, or null. */
 export class ServerError extends Error {
@@ -17,7 +17,7 @@ const restart = () => `start it again with: thud-driver explore --port ${locatio
 
 let tokenInAddress = "";
 
-/** Return the parameters of the address; the token moves to the storage of the browser, if that takes it. */
+/** Return the parameters of the address; the token moves to the storage of the browser. */
 export function takeFragment() {
   const parameters = new URLSearchParams(location.hash.slice(1));
   const token = parameters.get("token");
@@ -38,7 +38,7 @@ export function setFragment(text) {
 /** Parameters with which the page was opened. */
 export const fragment = takeFragment();
 
-/** Return the response; throw ServerError, ConnectionError or, if the request was cancelled, AbortError. */
+/** Return the response; throw ServerError, ConnectionError or, if cancelled, AbortError. */
 export async function ask(path, options = {}) {
   // Another page in this browser may have stored the token of a new server.
   const token = stored("token");
@@ -55,7 +55,7 @@ export async function ask(path, options = {}) {
   throw response.status === 403 ? new ConnectionError(report.error) : new ServerError(report);
 }
 
-/** Return the answer at the end of a stream of reports; `onProgress` gets the completed fraction. */
+/** Return the answer at the end of a stream of reports; `onProgress` gets the fraction done. */
 export async function follow(path, body, signal, onProgress) {
   const response = await ask(path, { method: "POST", body, signal });
   // A quick answer comes as a whole, not as a stream.

@@ -1,11 +1,17 @@
 // Display of answers: headline, plots, criteria, floor, room and warnings.
-import { byId, capitalize, element, minus, rounded, signed, withSymbols } from "./page.js";
-import { plot, swatch } from "./plot.js";
+import {
+  byId, capitalize, element, fillTable, minus, rounded, signed, withSymbols,
+} from "thud/page.js";
+import { plot, swatch } from "thud/plot.js";
 
-// Uncertainties by their codes: titles, and what stands below the criteria.
-const UNCERTAINTIES = { numerical: ["numerical error", "numerical error of the computation"], measured: ["uncertainty (95 %)", "measurement uncertainty (95 %)"] };
+// Uncertainties by their codes.
+const UNCERTAINTIES = {
+  numerical: "numerical error of the computation", measured: "measurement uncertainty (95 %)",
+};
 // Verdicts on a source, and signs, by the code of the result.
-export const SOURCE_VERDICTS = { conforms: "conforms", does_not_conform: "does not conform", undecided: "undecided" };
+export const SOURCE_VERDICTS = {
+  conforms: "conforms", does_not_conform: "does not conform", undecided: "undecided",
+};
 const SIGNS = { conforms: "✓", does_not_conform: "✕", undecided: "?", level: "" };
 // Titles of the force by its code.
 const FORCES = { elastic: "Elastic force", floor: "Force on the floor" };
@@ -15,7 +21,8 @@ const MIN_UNCERTAINTY = 0.02;
 /** Return the headline of an answer as a text. */
 export const headlineText = ({ headline: { words, why, also } }) => `${words}${why}${also}`;
 
-const uncertaintyText = ({ uncertainty, uncertainty_text: text, mark }) => `${text ?? Number(uncertainty.toPrecision(2))}${mark ? ` ${mark}` : ""}`;
+const uncertaintyText = ({ uncertainty, uncertainty_text: text, mark }) =>
+  `± ${text ?? Number(uncertainty.toPrecision(2))} ${mark ?? ""}`.trim();
 
 /** Show the answer to the question; `variant` has a label and an answer. */
 function showHeadline({ label, answer }) {
@@ -25,20 +32,23 @@ function showHeadline({ label, answer }) {
   byId("verdict").replaceChildren(
     ...(SIGNS[result] ? [element("span", { class: "sign", "aria-hidden": "true" }, SIGNS[result])] : []),
     element("span", { class: "subject" }, `${label} `),
-    element("b", {}, capitalize(words)), element("span", { class: "why" }, why, element("span", { class: "wide" }, also)));
+    element("b", {}, capitalize(words)),
+    element("span", { class: "why" }, why, element("span", { class: "wide" }, also)));
   byId("detail").replaceChildren(...withSymbols(detail ?? ""));
   // Narrow screens name the case here.
   if (SIGNS[result]) byId("detail").dataset.subject = label;
   else delete byId("detail").dataset.subject;
-  byId("numbers").textContent = answer.numbers.map(([title, value, unit]) => `${title} ${rounded(value, unit)}`).join(" · ");
+  const numbers = answer.numbers.map(([title, value, unit]) => `${title} ${rounded(value, unit)}`);
+  byId("numbers").textContent = numbers.join(" · ");
 }
 
 /** Show warnings, and those open that can change the verdict. */
 export function showWarnings({ answer: { warnings, open_warnings: open = [] } }) {
-  byId("open_warnings").replaceChildren(...open.map((warning) => element("li", {}, ...withSymbols(capitalize(warning)))));
+  const items = (list) => list.map((text) => element("li", {}, ...withSymbols(text)));
+  byId("open_warnings").replaceChildren(...items(open.map(capitalize)));
   byId("warnings_section").hidden = !warnings.length;
-  byId("warnings_title").textContent = warnings.length === 1 ? "1 warning" : `${warnings.length} warnings`;
-  byId("warnings").replaceChildren(...warnings.map((warning) => element("li", {}, ...withSymbols(warning))));
+  byId("warnings_title").textContent = `${warnings.length} warning${warnings.length < 2 ? "" : "s"}`;
+  byId("warnings").replaceChildren(...items(warnings));
 }
 
 /** Return the low and high end of a criterion by its uncertainty. */
@@ -51,16 +61,16 @@ function showForces(variants, { thirds }) {
   const [first] = variants;
   const levelsOf = ({ answer }) => (thirds ? answer.levels.thirds : answer.levels);
   const bands = levelsOf(first).frequency;
-  const octavesOf = ({ answer }) => answer.criteria.filter((criterion) => criterion.band);
+  const octavesOf = ({ answer }) => answer.criteria.filter(({ band }) => band);
   plot(byId("levels"), {
     title: "Force exposure level",
     curves: variants.map((variant) => ({
       name: variant.label, style: variant.style, x: bands.map((_, k) => k), marks: true,
       y: levelsOf(variant).level, ends: thirds ? undefined : octavesOf(variant).map(endsOf),
     })),
-    x: { title: thirds ? "One-third-octave band" : "Octave band", unit: "Hz", bands: bands.map(String) },
+    x: { title: `${thirds ? "One-third-o" : "O"}ctave band`, unit: "Hz", bands: bands.map(String) },
     y: { title: "Level", unit: "dB", reference: " re 1 N, 1 s" },
-    limits: thirds ? undefined : octavesOf(first).map((criterion) => [criterion.lower, criterion.upper]),
+    limits: thirds ? undefined : octavesOf(first).map(({ lower, upper }) => [lower, upper]),
     results: octavesOf(first).map(({ result }) => result),
   });
   byId("force_title").textContent = FORCES[first.answer.force.kind ?? "floor"];
@@ -68,8 +78,8 @@ function showForces(variants, { thirds }) {
     title: byId("force_title").textContent, hasCursor: true,
     curves: variants.flatMap(({ label, style, answer: { force, floor } }) => [
       { name: label, style, x: force.time, y: force.value },
-      ...(floor ? [{ name: `${label}, on the floor`, style, x: floor.force.time, y: floor.force.value, thin: true }] : []),
-    ]),
+      floor && { name: `${label}, on the floor`, style, x: floor.force.time, y: floor.force.value, thin: true },
+    ]).filter(Boolean),
     x: { title: "Time", unit: "ms" },
     y: { title: "Force, low-passed at 1.25 kHz", unit: "N", zero: true },
   });
@@ -81,25 +91,25 @@ function showRooms(variants) {
   const hasRoom = Boolean(variants[0].answer.room);
   for (const name of ["room_figure", "contributions_figure"]) byId(name).hidden = !hasRoom;
   if (!hasRoom) return;
-  const [first] = rooms;
+  const { frequency: bands, contributions } = rooms[0].answer.room;
   plot(byId("room"), {
     title: "Level in the room below",
     curves: rooms.map(({ label, style, answer: { room } }) => ({
       name: label, style, x: room.level.map((_, k) => k), marks: true, y: room.level,
       ends: room.level.map((level, k) => [level - room.uncertainty[k], level + room.uncertainty[k]]),
     })),
-    x: { title: "One-third-octave band", unit: "Hz", bands: first.answer.room.frequency.map(String) },
+    x: { title: "One-third-octave band", unit: "Hz", bands: bands.map(String) },
     y: { title: "Maximum Fast level", unit: "dB", reference: " re 20 µPa" },
   });
   plot(byId("contributions"), {
-    title: "Contributions to the standard uncertainty", x: { title: "Standard uncertainty", unit: "dB" },
-    rows: first.answer.room.contributions.filter(([, , value]) => value >= 0.05),
+    title: "Contributions to the standard uncertainty",
+    x: { title: "Standard uncertainty", unit: "dB" }, rows: contributions.filter(([, value]) => value >= 0.05),
   });
 }
 
-/** Return the swatch and the name of a variant; empty if there is only one variant. */
-function nameOf(variants, variant) {
-  return variants.length > 1 ? [swatch(variant.style), ` ${variant.label}: `] : [];
+/** Return the swatch and the name of a variant; a text if there is only one variant. */
+export function nameOf(variants, { style, label }, text) {
+  return variants.length > 1 ? [swatch(style), ` ${label}`] : [text];
 }
 
 /** Return the distance of a value from the nearer limit, negative outside. */
@@ -116,38 +126,37 @@ function missedSide(criterion) {
 
 /** Show the criteria of the standards; their names explain themselves. */
 function showCriteria(variants) {
-  const cell = (criterion) => {
-    const value = element("td", { class: `value ${criterion.result}` }, minus(criterion.value_text || "not known"));
-    if (criterion.uncertainty) value.append(" ", element("span", { title: UNCERTAINTIES[criterion.uncertainty_kind][0] }, `± ${uncertaintyText(criterion)}`));
-    return value;
+  const valueOf = (criterion) => {
+    const { result, uncertainty, value_text: text } = criterion;
+    const expanded = uncertainty ? [" ", element("span", {}, uncertaintyText(criterion))] : [];
+    return element("td", { class: `value ${result}` }, minus(text || "not known"), ...expanded);
   };
-  const margin = (criterion) => {
+  const marginCell = (criterion) => {
     const isExact = criterion.lower === criterion.upper || criterion.value === null;
-    return element("td", { class: "margin" }, isExact ? "" : signed(marginOf(criterion), criterion.unit), " ", missedSide(criterion));
+    const text = isExact ? "" : signed(marginOf(criterion), criterion.unit);
+    return element("td", { class: "margin" }, `${text} ${missedSide(criterion)}`);
   };
-  const rows = variants[0].answer.criteria.map((criterion, i) => element("tr", {},
-    element("th", { scope: "row" }, term(criterion)),
-    element("td", {}, criterion.lower === criterion.upper ? `${criterion.lower}` : `${criterion.lower} to ${criterion.upper}`),
-    ...variants.flatMap((variant, k) => [cell(variant.answer.criteria[i]), ...(k ? [] : [margin(criterion)])])));
-  const heads = variants.flatMap((variant, k) => [
-    element("th", { scope: "col" }, ...(variants.length > 1 ? [swatch(variant.style), ` ${variant.label}`] : ["Value"])),
-    ...(k ? [] : [element("th", { scope: "col", class: "margin" }, "Margin")]),
-  ]);
-  byId("criteria").replaceChildren(
-    element("thead", {}, element("tr", {}, element("th", { scope: "col" }, "Criterion"), element("th", { scope: "col" }, "Limits"), ...heads)),
-    element("tbody", {}, ...rows));
-  byId("criteria_section").classList.toggle("half", Boolean(variants[0].answer.motion) && variants.length < 3);
-  const names = new Set(variants.flatMap(({ answer }) => answer.criteria).filter(({ uncertainty }) => uncertainty).map((criterion) => criterion.uncertainty_kind));
-  const uncertainties = names.size ? `±: ${[...names].map((kind) => UNCERTAINTIES[kind][1]).join("; ")}. ` : "";
-  byId("criteria_text").textContent = `${uncertainties}${variants[0].answer.criteria[0].standard ?? ""}`;
+  const [{ answer: { criteria, motion } }, ...others] = variants;
+  const head = (variant) => nameOf(variants, variant, "Value");
+  fillTable("criteria", ["Criterion", "Limits", head(variants[0]),
+    element("th", { scope: "col", class: "margin" }, "Margin"), ...others.map(head)],
+  criteria.map((criterion, i) => [
+    term(criterion), [...new Set([criterion.lower, criterion.upper])].join(" to "), valueOf(criterion),
+    marginCell(criterion), ...others.map(({ answer }) => valueOf(answer.criteria[i]))]));
+  byId("criteria_section").classList.toggle("half", Boolean(motion) && variants.length < 3);
+  const stated = variants.flatMap(({ answer }) => answer.criteria.filter((entry) => entry.uncertainty));
+  const kinds = [...new Set(stated.map((entry) => UNCERTAINTIES[entry.uncertainty_kind]))];
+  const text = kinds.length ? `±: ${kinds.join("; ")}. ` : "";
+  byId("criteria_text").textContent = `${text}${criteria[0].standard}`;
 }
 
 /** Return the name of a criterion, which opens its explanation. */
 function term(criterion) {
   const name = capitalize(criterion.name) + (criterion.unit ? `, ${criterion.unit}` : "");
-  const lines = [["", criterion.explanation], ["Limits: ", criterion.limit_source], ["Standard: ", criterion.standard]];
+  const { explanation, limit_source: limits, standard } = criterion;
+  const lines = [["", explanation], ["Limits: ", limits], ["Standard: ", standard]];
   return element("details", { class: "term" }, element("summary", {}, name),
-    ...lines.filter(([, text]) => text).map(([title, text]) => element("p", {}, element("b", {}, title), ...withSymbols(text))));
+    ...lines.map(([title, text]) => element("p", {}, element("b", {}, title), ...withSymbols(text))));
 }
 
 /** Show how the floors move. */
@@ -155,18 +164,19 @@ export function showFloors(variants) {
   const floors = variants.filter((variant) => variant.answer.floor);
   byId("floor_section").hidden = !variants[0].answer.floor;
   if (!variants[0].answer.floor) return;
-  byId("floor_title").textContent = `Floor response: ${floors[0].answer.floor.name}`;
+  const { name, header, rows } = floors[0].answer.floor;
+  byId("floor_title").textContent = `Floor response: ${name}`;
   plot(byId("velocity"), {
     title: "Velocity of the floor",
-    curves: floors.map(({ label, style, answer: { floor } }) => ({ name: label, style, x: floor.velocity.time, y: floor.velocity.value })),
+    curves: floors.map(({ label, style, answer: { floor: { velocity } } }) =>
+      ({ name: label, style, x: velocity.time, y: velocity.value })),
     x: { title: "Time", unit: "ms" }, y: { title: "Velocity of the floor", unit: "mm/s", zero: true },
   });
-  const quantity = ([title, value, unit]) => `${title} ${unit === "dB" ? `${signed(value, unit)} dB` : rounded(value, unit)}`;
-  byId("floor_text").replaceChildren(...floors.map((variant) => element("li", {}, ...nameOf(variants, variant), variant.answer.floor.numbers.map(quantity).join("; "))));
-  const { header, rows } = floors[0].answer.floor;
-  byId("floor_table").replaceChildren(
-    element("thead", {}, element("tr", {}, ...header.map((title) => element("th", { scope: "col" }, capitalize(title))))),
-    element("tbody", {}, ...rows.map(([first, ...cells]) => element("tr", {}, element("th", { scope: "row" }, first), ...cells.map((text) => element("td", {}, minus(text)))))));
+  const quantity = ([title, value, unit]) =>
+    `${title} ${unit === "dB" ? `${signed(value, unit)} dB` : rounded(value, unit)}`;
+  byId("floor_text").replaceChildren(...floors.map((variant) => element("li", {},
+    ...nameOf(variants, variant, ""), ` ${variant.answer.floor.numbers.map(quantity).join("; ")}`)));
+  fillTable("floor_table", header.map(capitalize), rows.map((cells) => cells.map(minus)));
 }
 
 /** Show headline, plots and criteria of variants, of which the first is the answer of its door. */

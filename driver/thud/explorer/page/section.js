@@ -1,6 +1,6 @@
 // Section of the floor with the source above it and the room below, and the ratings of the room.
-import { byId, element, minus, rounded, svgElement, withSymbols } from "./page.js";
-import { swatch } from "./plot.js";
+import { byId, element, fillTable, minus, rounded, svgElement, withSymbols } from "thud/page.js";
+import { nameOf } from "thud/results.js";
 
 // Width of the drawn floor, height above it besides the ball, of the room, and of a number beside
 // a layer, px; largest height of the floor, px, and its scale, px per m, if it is thinner.
@@ -73,15 +73,14 @@ export function showRatings(variants) {
   byId("ratings_section").hidden = !variants[0].answer.room;
   if (!rooms.length) return;
   const level = (value) => minus(value.toFixed(1));
-  const row = (name, cellOf) => element("tr", {}, element("th", { scope: "row" }, ...withSymbols(name)),
-    ...rooms.map(({ answer: { room } }) => element("td", {}, cellOf(room))));
-  const [first] = rooms;
-  byId("ratings").replaceChildren(
-    element("thead", {}, element("tr", {}, element("th", { scope: "col" }, "Rating, dB"),
-      ...rooms.map(({ label, style }) => element("th", { scope: "col" },
-        ...(rooms.length > 1 ? [swatch(style), ` ${label}`] : ["Level ± standard uncertainty"]))))),
-    element("tbody", {},
-      ...first.answer.room.ratings.map(([name], i) => row(name, ({ ratings }) => `${level(ratings[i][1])} ± ${level(ratings[i][2])}`)),
-      ...(rooms.some(({ answer }) => answer.room.class) ? [row("Class (KS F 2863-2)", (room) => room.class || "–")] : []),
-      ...first.answer.room.octaves.map(([band], i) => row(`Octave of ${band} Hz`, ({ octaves }) => level(octaves[i][1])))));
+  const row = (name, cellOf) => [withSymbols(name), ...rooms.map(({ answer: { room } }) => cellOf(room))];
+  const { ratings: names, octaves: bands } = rooms[0].answer.room;
+  const heads = rooms.map((variant) => nameOf(rooms, variant, "Level ± standard uncertainty"));
+  fillTable("ratings", ["Rating, dB", ...heads], [
+    ...names.map(([name], i) => row(name, ({ ratings }) =>
+      ratings[i].slice(1).map(level).join(" ± "))),
+    ...(rooms.some(({ answer }) => answer.room.class)
+      ? [row("Class (KS F 2863-2)", (room) => room.class || "–")] : []),
+    ...bands.map(([band], i) => row(`Octave of ${band} Hz`, ({ octaves }) => level(octaves[i][1]))),
+  ]);
 }

@@ -1,9 +1,9 @@
 // Steps of undo, and what the browser stores.
-import { byId } from "./page.js";
-import { storeCase, storedCase } from "./storage.js";
-import { about, state } from "./form.js";
-import { keepStated, recording } from "./recording.js";
-import { current, isCurrent, kept } from "./answers.js";
+import { byId } from "thud/page.js";
+import { storeCase, storedCase } from "thud/storage.js";
+import { about, state } from "thud/form.js";
+import { keepStated, recording } from "thud/recording.js";
+import { current, isCurrent, kept } from "thud/answers.js";
 
 // Pause after a change before it can be undone, ms.
 const COMMIT_PAUSE = 400;
@@ -34,11 +34,12 @@ function sameCase(one, other) {
 }
 
 function showSteps() {
-  const isFocused = [byId("undo"), byId("redo")].includes(document.activeElement);
-  byId("undo").disabled = steps.at <= 0;
-  byId("redo").disabled = steps.at >= steps.list.length - 1;
+  const [undo, redo] = [byId("undo"), byId("redo")];
+  const focused = [undo, redo].find((target) => target === document.activeElement);
+  undo.disabled = steps.at <= 0;
+  redo.disabled = steps.at >= steps.list.length - 1;
   // A button that is disabled loses the focus.
-  if (isFocused) [document.activeElement, byId("undo"), byId("redo")].find((target) => target?.matches("button:enabled"))?.focus();
+  if (focused) [focused, undo, redo].find(({ disabled }) => !disabled)?.focus();
 }
 
 /** Take over the values of another step; return whether there is one. */
@@ -69,7 +70,7 @@ function store() {
   storeCase(entry, { ...entry, shown: null, kept: [] });
 }
 
-/** Restore what this browser has stored for the same start of the page; return whether there was something. */
+/** Restore what this browser has stored for the same start; return whether there was something. */
 export function restoreStored() {
   const entry = storedCase();
   if (entry?.start !== JSON.stringify(about.start) || !about.models.some(({ name }) => name === entry.state?.model)) return false;

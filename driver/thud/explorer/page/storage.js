@@ -32,7 +32,7 @@ export function storedCase() {
   try { return JSON.parse(stored(CASE)); } catch { return null; }
 }
 
-/** Store the first of the contents for which there is room, for this tab and for tabs that will be opened. */
+/** Store the first of the contents for which there is room, for this tab and for others. */
 export function storeCase(...contents) {
   for (const area of AREAS) contents.some((content) => storeText(CASE, JSON.stringify(content), area));
 }

@@ -1,13 +1,17 @@
 // Variants: what they are called, by what differs, and their table.
-import { button, byId, capitalize, element, minus, scaled, signed } from "./page.js";
-import { STYLES, swatch } from "./plot.js";
-import { SOURCE_VERDICTS, headlineText } from "./results.js";
-import { about, defaultOf, factsOf, findField } from "./form.js";
+import { button, capitalize, element, fillTable, minus, scaled, signed } from "thud/page.js";
+import { STYLES, swatch } from "thud/plot.js";
+import { SOURCE_VERDICTS, headlineText } from "thud/results.js";
+import { about, defaultOf, factsOf, findField } from "thud/form.js";
 
 // Words of keys in names, if shorter than their labels.
-const WORDS = { "ball.youngs_modulus": "E", "ball.wall_thickness": "wall", "ball.outer_radius": "radius", "drop.height": "drop", "plate.thickness": "slab", "room.reverberation_time": "T" };
+const WORDS = {
+  "ball.youngs_modulus": "E", "ball.wall_thickness": "wall", "ball.outer_radius": "radius",
+  "drop.height": "drop", "plate.thickness": "slab", "room.reverberation_time": "T",
+};
 // Number of differences in a name.
 const MAX_DIFFERENCES = 3;
+
 /** Return a free style for a further variant. */
 export function freeStyle(variants) {
   const used = variants.map(({ style }) => style);
@@ -29,18 +33,18 @@ export function nameVariants(variants) {
     const shown = [...(hasBase ? [base] : []), ...words.slice(0, MAX_DIFFERENCES), ...(words.length > MAX_DIFFERENCES ? ["…"] : [])];
     variant.label = variant.title ?? capitalize(shown.join(", "));
   }
-  for (const variant of variants) if (!variant.values) variant.label = variant.title ?? variant.name;
-  // An image of a plot holds neither control characters nor halves of characters.
-  for (const variant of variants) variant.label = variant.label.replace(/[\p{Cc}\p{Cs}\uFFFE\uFFFF]/gu, "");
   const seen = new Map();
   for (const variant of variants) {
+    if (!variant.values) variant.label = variant.title ?? variant.name;
+    // An image of a plot holds neither control characters nor halves of characters.
+    variant.label = variant.label.replace(/[\p{Cc}\p{Cs}\uFFFE\uFFFF]/gu, "");
     const count = (seen.get(variant.label) ?? 0) + 1;
     seen.set(variant.label, count);
     if (count > 1) variant.label += ` (${count})`;
   }
 }
 
-/** Return the preset or construction that is closest to a case, and the changed keys, "group.key". */
+/** Return the preset or construction that is closest to a case, and the keys that differ. */
 function describe({ values, chosen }) {
   const { model, floor } = values;
   const isFloor = (group) => Boolean(floor) && (group === floor.name || group === "room");
@@ -69,7 +73,7 @@ function closest(values, isOwn, candidates) {
     const changes = keys.filter((key) => valueText(values, key) !== valueText(candidate.values, key));
     return { base: candidate.title, changes: new Set(changes) };
   });
-  return results.reduce((best, result) => (result.changes.size < best.changes.size ? result : best));
+  return results.sort((one, other) => one.changes.size - other.changes.size)[0];
 }
 
 function keyValue(values, key) {
@@ -98,47 +102,50 @@ function wordsOf(key, values, hasBase) {
   return `${WORDS[key] ?? `${owner}${label?.toLowerCase() ?? name}`}${changed} ${valueText(values, key)}`;
 }
 
-/** Show the table of variants, of which the first belongs to the form; `actions` remove and rename one. */
+/** Show the table of variants, the first that of the form; `actions` remove and rename one. */
 export function showVariants(variants, { remove, rename }) {
+  const [first, ...others] = variants;
   const isRoom = variants.every(({ answer }) => answer.room);
+  const sourceOf = ({ answer }) => (answer.room?.source ?? answer.headline).result;
+  const verdict = (variant) =>
+    element("td", { class: sourceOf(variant) }, SOURCE_VERDICTS[sourceOf(variant)]);
+  const level = ({ answer }) => element("td", { class: answer.room && answer.headline.result },
+    answer.room ? headlineText(answer) : "–");
   const hasLevel = variants.some(({ answer }) => answer.room);
-  const sourceOf = ({ answer }) => answer.room?.source ?? answer.headline;
-  const hasVerdict = !isRoom || variants.some((variant) => sourceOf(variant).result !== "conforms");
-  const [first] = variants;
-  const columns = isRoom ? roomColumns(variants) : sourceColumns(variants);
+  const hasVerdict = !isRoom || variants.some((variant) => sourceOf(variant) !== "conforms");
+  const texts = [
+    ...(hasVerdict ? [[hasLevel ? "Source" : "Verdict", verdict]] : []), ...(hasLevel ? [["Level", level]] : []),
+  ];
+  const columns = isRoom ? roomColumns(first) : sourceColumns(first);
   const cell = (variant, [, valueOf, unit, decimals]) => {
-    const value = valueOf(variant);
-    if (value === null || value === undefined) return element("td", {}, "–");
-    const reference = valueOf(first);
+    const [value, reference] = [valueOf(variant), valueOf(first)];
+    if (typeof value !== "number") return "–";
     const text = minus(value.toFixed(decimals));
-    if (variant === first || reference === null || reference === undefined) return element("td", {}, text);
+    if (variant === first || typeof reference !== "number") return text;
     const difference = Number((value - reference).toFixed(decimals));
-    return element("td", {}, text, element("small", {}, difference ? `${signed(difference, "dB", decimals)}` : "±0"));
+    return [text, element("small", {}, difference ? signed(difference, "dB", decimals) : "±0")];
   };
-  const rows = variants.map((variant, i) => {
-    const name = button(variant.label, () => rename(variant, prompt("Name of the variant", variant.label)),
-      { class: "name", title: "Rename", "aria-label": `Rename ${variant.label}` });
-    const { answer } = variant;
-    const source = sourceOf(variant).result;
-    return element("tr", {}, element("th", { scope: "row" }, element("span", { class: "named" }, swatch(variant.style), name)),
-      ...(hasVerdict ? [element("td", { class: source }, SOURCE_VERDICTS[source])] : []),
-      ...(hasLevel ? [element("td", { class: answer.room ? answer.headline.result : "" }, answer.room ? headlineText(answer) : "–")] : []),
-      ...columns.map((column) => cell(variant, column)),
-      element("td", {}, i ? button("×", () => remove(variant), { class: "remove", "aria-label": `Remove ${variant.label}` }) : ""));
-  });
-  byId("variants").replaceChildren(
-    element("thead", {}, element("tr", {}, element("th", { scope: "col" }, "Variant"), ...(hasVerdict ? [element("th", { scope: "col" }, hasLevel ? "Source" : "Verdict")] : []), ...(hasLevel ? [element("th", { scope: "col" }, "Level")] : []),
-      ...columns.map(([title, , unit]) => element("th", { scope: "col" }, title, element("small", {}, ` ${unit}`))), element("td", {}))),
-    element("tbody", {}, ...rows));
+  const name = (variant) => element("span", { class: "named" }, swatch(variant.style), button(
+    variant.label, () => rename(variant, prompt("Name of the variant", variant.label)),
+    { class: "name", title: "Rename", "aria-label": `Rename ${variant.label}` }));
+  const removal = (variant) => (others.includes(variant) ? button("×", () => remove(variant),
+    { class: "remove", "aria-label": `Remove ${variant.label}` }) : "");
+  fillTable("variants", ["Variant", ...texts.map(([title]) => title),
+    ...columns.map(([title, , unit]) => [title, element("small", {}, ` ${unit}`)]), element("td")],
+  variants.map((variant) => [name(variant), ...texts.map(([, cellOf]) => cellOf(variant)),
+    ...columns.map((column) => cell(variant, column)), removal(variant)]));
 }
 
-function sourceColumns([first]) {
-  const bands = first.answer.criteria.filter((criterion) => criterion.band).map((criterion, i) => [criterion.band, ({ answer }) => answer.criteria[i].value, "dB", 1]);
-  const number = (title, name, unit, decimals) => [title, ({ answer }) => answer.numbers.find(([, , , own]) => own === name)?.[1], unit, decimals];
+/** Return columns of the table: title, function of a variant, unit and decimals. */
+function sourceColumns({ answer: { criteria } }) {
+  const bands = criteria.filter(({ band }) => band).map(({ band }, i) =>
+    [band, ({ answer }) => answer.criteria[i].value, "dB", 1]);
+  const number = (title, name, unit, decimals) =>
+    [title, ({ answer }) => answer.numbers.find(([, , , own]) => own === name)?.[1], unit, decimals];
   return [...bands, number("Peak", "peak", "N", 0), number("Contact", "contact_time", "ms", 2)];
 }
 
-function roomColumns([first]) {
-  const bands = [50, 63, 80, 125, 250, 500].map((band) => [first.answer.room.frequency.indexOf(band), band]).filter(([i]) => i >= 0);
-  return bands.map(([i, band]) => [String(band), ({ answer }) => answer.room.level[i], "dB", 1]);
+function roomColumns({ answer: { room: { frequency } } }) {
+  return [50, 63, 80, 125, 250, 500].filter((band) => frequency.includes(band)).map((band) =>
+    [String(band), ({ answer: { room } }) => room.level[frequency.indexOf(band)], "dB", 1]);
 }
