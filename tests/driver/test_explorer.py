@@ -242,12 +242,6 @@ def test_slow_case_reports_and_answers(client: TestClient) -> None:
     assert np.shape(answer["motion"]["outer"])[1:] == (33, 2)
 
 
-def test_too_many_samples_are_refused(client: TestClient) -> None:
-    response = client.post("/solve", json=SHELL | {"sampling": {"sample_rate": 1e7}})
-    assert response.status_code == 400
-    assert re.search("samples|steps", response.text)
-
-
 def test_floor_and_room_are_answered(client: TestClient) -> None:
     answer = solved(client, SHELL | {"floor": {"name": "joist_floor"}, "room": {"volume": 30}})
     impact = thud.solve(floor=thud.JoistFloor(), model="hollow_sphere").on_floor
@@ -267,19 +261,6 @@ def test_floor_and_room_are_answered(client: TestClient) -> None:
     assert numbers["peak force relative to rigid floor"] == pytest.approx(change)
     assert [row[0] for row in answer["floor"]["rows"]] == ["31.5", "63", "125", "250", "500"]
     assert len(answer["room"]["level"]) == 12
-
-
-def test_recording_is_assessed(client: TestClient) -> None:
-    path = REPOSITORY / "inputs/recordings/drop_1.wav"
-    query = {"name": "drop_1.wav", "height": 1, "mass": 2.5, "calibration": CALIBRATION}
-    report = measured(client, path.read_bytes(), **query)
-    answer = report["answer"]
-    recording = thud.read_recording(path, height=1.0, mass=2.5, calibration=CALIBRATION)
-    assert answer["levels"]["level"] == pytest.approx(recording.levels(), rel=1e-5)
-    assert answer["criteria"][0]["uncertainty"] > 0
-    assert answer["criteria"][0]["uncertainty_kind"] == "measured"
-    assert answer["result"] == RESULTS[recording.assess().conforms]
-    assert answer["drops"] == 1
 
 
 def test_recording_of_a_ball_that_is_not_known_is_shown(client: TestClient) -> None:
@@ -328,16 +309,6 @@ def test_bad_files_of_laboratories_get_a_sentence(
     client: TestClient, files: list[tuple[str, bytes]], words: str
 ) -> None:
     assert words in measured_with(client, *files)["error"]
-
-
-@pytest.mark.parametrize(
-    ("content", "name", "field"),
-    [(None, "a.wav", "calibration"), (b"force, N\n" + b"1\n2\n3\n" * 99, "a.csv", "sample_rate")],
-)
-def test_missing_value_of_a_recording_names_its_field(
-    client: TestClient, content: bytes | None, name: str, field: str
-) -> None:
-    assert measured(client, content or WAV, name=name)["field"] == field
 
 
 def table_of(force: np.ndarray, rate: float) -> bytes:
@@ -514,6 +485,8 @@ def test_page_asks_for_the_plate_of_the_example_and_is_right_with_it(client: Tes
     answer = measured(client, content, **fields, **asked["values"])["answer"]
     assert answer["headline"]["result"] == "undecided"
     assert [ask["values"] for ask in answer["asks"]] == [{"plate_share": ""}]
+    assert answer["criteria"][4]["mark"] == "†"
+    assert "share of the plate's resonance, assumed" in answer["headline"]["detail"]
     stated = asked["values"] | {"plate_share": 1, "plate_f0_uncertainty": 0.1}
     answer = measured(client, content, **fields, **stated)["answer"]
     octave = answer["criteria"][4]
@@ -550,39 +523,6 @@ def test_calibration_that_is_not_stated_leaves_the_verdict_undecided(client: Tes
     assert verdicts == ["does_not_conform", "undecided"]
 
 
-def test_share_of_the_plate_that_is_not_stated_leaves_the_verdict_undecided(
-    client: TestClient,
-) -> None:
-    query: dict[str, Any] = {
-        "name": "drop.csv", "height": 1, "mass": 2.5, "plate_f0": 1100, "plate_Q": 25,
-        "height_uncertainty": 0.002, "mass_uncertainty": 0.01, "calibration_uncertainty": 0.01,
-        "plate_f0_uncertainty": 0.01,
-    }  # fmt: skip
-    content = (RECORDINGS / "drop_1.csv").read_bytes()
-    answers = {
-        share: measured(client, content, **query, **({"plate_share": share} if share else {}))[
-            "answer"
-        ]
-        for share in (0, 1, 0.5)
-    }
-    assert [answer["headline"]["result"] for answer in answers.values()] == [
-        "undecided", "does_not_conform", "conforms",
-    ]  # fmt: skip
-    level, whole, half = (answer["criteria"][4] for answer in answers.values())
-    assert level["value"] + level["uncertainty"] > half["value"] > whole["value"]
-    headline = answers[0]["headline"]
-    assert headline["words"] == "undecided"
-    assert headline["why"].startswith(": 500 Hz")
-    assert "500 Hz: share of the plate's resonance, assumed" in headline["detail"]
-    # The uncertainty is marked, with the words of its mark, the standard and the assumed source.
-    assert level["mark"] == "†"
-    assert "† The uncertainty excludes" in headline["detail"]
-    assert "JIS A 1418-2" in headline["detail"]
-    assert headline["detail"].endswith("The source is not stated: these limits are assumed.")
-    stated = measured(client, content, **query, source="rubber_ball")["answer"]["headline"]
-    assert "assumed." not in stated["detail"].partition("Limits of")[2]
-
-
 def test_headline_names_everything_that_is_not_known(client: TestClient) -> None:
     content = (RECORDINGS / "drop_1.csv").read_bytes()
     headline = measured(client, content, name="drop_1.csv")["answer"]["headline"]
@@ -616,6 +556,8 @@ def test_several_files_are_the_drops_of_one_measurement(client: TestClient) -> N
         paths, config=config_from({"height": 1, "mass": 2.5, "plate": plate})
     )
     assert answer["drops"] == 3
+    assert answer["criteria"][0]["uncertainty_kind"] == "measured"
+    assert answer["result"] == RESULTS[recording.assess().conforms]
     assert answer["levels"]["level"] == pytest.approx(recording.levels(), rel=1e-5)
     thirds = recording.levels("third")
     assert answer["levels"]["thirds"]["level"] == pytest.approx(thirds, rel=1e-5)
@@ -703,6 +645,8 @@ def test_recordings_and_works_leave_no_files(
         ({"ball": {"mass": 1e300}}, "mass"),
         ({"ball": {"mass": {"a": 1}}}, "groups"),
         ({"sampling": {"substeps": 10**400}}, "substeps"),
+        (SHELL | {"sampling": {"sample_rate": 1e7}}, "samples"),
+        *((SHELL | {group: {"foo": 1}}, "'foo' is not known") for group in ("plate", "room")),
     ],
 )
 def test_bad_values_get_a_sentence(client: TestClient, values: object, words: str) -> None:
@@ -801,12 +745,13 @@ def test_first_picture_is_in_the_page_and_modules_are_files(client: TestClient) 
     modules = json.loads(re.findall(r'"importmap"[^>]*>(.*?)</script>', response.text)[0])[
         "imports"
     ]
-    assert set(modules) == {f"http://127.0.0.1/page/{name}.js" for name in page_file.FIRST}
-    for address, data in modules.items():
+    folder = modules.pop("thud/")
+    assert set(modules) == {f"thud/{name}.js" for name in page_file.FIRST}
+    for module, data in modules.items():
+        address = module.replace("thud/", folder)
         file = client.get(address)
         assert file.headers["content-type"].startswith("text/javascript")
-        text = unquote(data.removeprefix("data:text/javascript,"))
-        assert text.replace("http://127.0.0.1/page/", "./") == file.text
+        assert unquote(data.removeprefix("data:text/javascript,")) == file.text
         tag = {"If-None-Match": file.headers["etag"]}
         assert client.get(address, headers=tag).status_code == 304
 
@@ -862,11 +807,6 @@ def test_bodies_may_be_as_long_as_allowed_and_no_longer(client: TestClient, path
     assert [status(n) for n in (limit, limit + 1, None)] == [200, 413, 411]
 
 
-def test_limits_of_bodies_are_those_of_the_documentation() -> None:
-    assert server.MAX_CASE == 0.1e6
-    assert server.MAX_RECORDING == 200e6
-
-
 def test_downloads_are_what_they_say(client: TestClient, tmp_path: Path) -> None:
     values = SHELL | {"drop": {"height": 0.7}}
     path = tmp_path / "case.nml"
@@ -892,12 +832,6 @@ def test_script_computes_the_case(
     assert namespace["case"] == new_case(values | {"case": {"name": "python"}})
     assert f"{namespace['impact'].levels().round(2)}" in capsys.readouterr().out
     assert ("predict_level" in text) == ("room" in values)
-
-
-def test_names_in_a_script_are_texts(client: TestClient) -> None:
-    values = SHELL | {"case": {"name": "a'b"}}
-    response = client.post("/download/case.py", json=values)
-    assert response.status_code == 400 or '"a\'b"' in response.text
 
 
 def test_smallest_change_that_conforms_is_found(client: TestClient) -> None:
@@ -1007,13 +941,6 @@ def test_recording_without_a_physical_restitution_is_not_fitted(client: TestClie
     case = json.dumps({"model": {"name": "hunt_crossley"}})
     form = form_of(content, {"name": "drop_1.csv", "height": 1, "mass": 8, "case": case})
     assert "the restitution of the recording is −" in last_report(client, "/fit", **form)["error"]
-
-
-def test_unknown_key_of_an_options_group_is_refused(client: TestClient) -> None:
-    for group in ("finite_element", "plate", "room"):
-        response = client.post("/solve", json=SHELL | {group: {"foo": 1}})
-        assert response.status_code == 400
-        assert "'foo' is not known" in response.json()["error"]
 
 
 def test_measured_modes_below_a_floor_say_that_the_floor_does_not_move(client: TestClient) -> None:
