@@ -155,7 +155,7 @@ export function showAsks(asks, { onChange, onTyping }) {
     onChange();
   };
   const sending = button("Assess with this", send, { class: "strong", type: "submit", id: "assess" });
-  asked.replaceChildren(...cards, sending);
+  asked.replaceChildren(...cards, ...(cards.length ? [sending] : []));
   // After Enter the next value is missing.
   if (focus) (byId(focus) ?? asked.querySelector("input"))?.focus();
 }
