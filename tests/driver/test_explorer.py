@@ -260,6 +260,9 @@ def test_floor_and_room_are_answered(client: TestClient) -> None:
     change = 20 * np.log10(impact.peak_force / blocked.peak_force)
     assert numbers["peak force relative to rigid floor"] == pytest.approx(change)
     assert [row[0] for row in answer["floor"]["rows"]] == ["31.5", "63", "125", "250", "500"]
+    energy = [float(row[-1]) for row in answer["floor"]["rows"]]
+    assert energy == pytest.approx(1e3 * impact.injected_energy().energy, rel=6e-3)
+    assert "e" not in "".join(row[-1] for row in answer["floor"]["rows"])
     assert len(answer["room"]["level"]) == 12
 
 

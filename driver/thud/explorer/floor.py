@@ -67,6 +67,10 @@ def floor_answer(impact: Impact, on_floor: FloorImpact) -> Answer:
     times = 1e3 * (on_floor.time - on_floor.touch_time)
     contact = contact_force(on_floor, "floor")
     header, *rows = on_floor.rows()
+    energy = [
+        np.format_float_positional(1e3 * value, 3, fractional=False, trim="-")
+        for value in on_floor.injected_energy().energy
+    ]
     change = 20 * np.log10(on_floor.peak_force / impact.peak_force)
     return {
         "name": humanize(on_floor.floor.name),
@@ -78,8 +82,8 @@ def floor_answer(impact: Impact, on_floor: FloorImpact) -> Answer:
             ["maximum displacement", 1e6 * on_floor.floor_displacement.max(), "µm"],
             ["energy into the floor", 1e3 * on_floor.floor_work, "mJ"],
         ],
-        "header": header,
-        "rows": rows,
+        "header": [*header[:-1], "energy, mJ"],
+        "rows": [[*row[:-1], value] for row, value in zip(rows, energy, strict=True)],
     }
 
 
