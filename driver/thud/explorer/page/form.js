@@ -186,7 +186,8 @@ function replaceInputs(children) {
   kept.after(...children.slice(at + 1));
   const { value } = children[at].querySelector("select");
   if (focused.value !== value) focused.value = value;
-  kept.replaceChildren(kept.firstChild, ...[...children[at].children].slice(1));
+  for (const help of kept.querySelectorAll(":scope > .help")) help.remove();
+  kept.append(...children[at].querySelectorAll(":scope > .help"));
 }
 
 const balls = () => about.presets.filter(({ door }) => door === "ball");
