@@ -88,7 +88,7 @@ def _improve_source(case: Case) -> Work:
         conforms = solve_many({name: block}, case).conforms
         for value in np.array(block)[conforms].tolist():
             # Half a step less, too; with numerical errors, which many drops do not have.
-            factor = value / number_in(case, name)
+            factor = value / value_in(case, name)
             less = factor * math.exp(math.copysign(STEP / 2, 1 - factor))
             found |= next(
                 (

@@ -109,7 +109,9 @@ def _fields() -> Iterator[Field]:
             yield Field(name, label, "choice", choices=choices, folded=name in FOLDED)
         else:
             # Uncertainties without a unit are relative.
-            unit = check.keywords.get("unit") or (PERCENT if key.endswith("uncertainty") else "")
+            unit = check.keywords.get("unit") or (
+                PERCENT if "uncertainty" in key.split("_") else ""
+            )
             label = ", ".join(filter(None, (label, unit)))
             yield Field(name, label, unit=unit, folded=name in FOLDED)
 

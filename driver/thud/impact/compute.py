@@ -131,7 +131,7 @@ def new_impact(case: Case, answer: Bundle) -> Impact:
     return Impact(
         **fields,
         notes=notes(answer["warnings"]) if "warnings" in answer else (),
-        on_floor=new_floor_impact(case, answer, fields["floor_force"]),
+        on_floor=(new_floor_impact(case, answer, fields["floor_force"]) if case.floor else None),
         room_level=new_room_level(answer) if "room" in answer else None,
     )
 
