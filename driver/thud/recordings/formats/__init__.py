@@ -209,7 +209,8 @@ def uniform_grid(time: NDArray[np.float64], name: str) -> tuple[float, float, tu
     if deviation[worst] <= NOTED:
         return begin, step, ()
     size = float(deviation[worst]) * step
-    return begin, step, (Note("times_rounded", name, size, unit="s", others={"rate": 1 / step}),)
+    others = {"rate": 1 / step}
+    return begin, step, (Note("times_rounded", name, 1e6 * size, unit="µs", others=others),)
 
 
 def agreed_rate(stated: float | None, of_times: float, name: str) -> float:
