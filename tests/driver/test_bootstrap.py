@@ -67,7 +67,7 @@ def test_run_prints_one_screen(built_checkout: Path) -> None:
     row = next(i for i, line in enumerate(shown) if line.startswith("verdict"))
     assert shown[row].split()[1:] == ["does", "not", "conforms", "conforms"]
     assert shown[row + 1].split() == ["conform"]
-    assert lines[-1] == "Page: outputs/comparison/comparison.html"
+    assert lines[-1] == "Results: outputs/comparison"
     assert "minimum step" not in done.stdout
     assert (built_checkout / "outputs/rubber_ball_fe/summary.nml").exists()
 

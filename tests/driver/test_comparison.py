@@ -66,7 +66,7 @@ def test_page_is_complete_in_one_file(tmp_path: Path) -> None:
     body = re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
     assert "http" not in body
     assert not re.search(r"<(script|link|img)[^>]*\b(src|href)=", page)
-    assert "function drawCurves(" in page
+    assert '"thud/plot.js": "data:text/javascript;base64,' in page
 
 
 def column(comparison: thud.Comparison, number: int = 1) -> dict[str, str]:

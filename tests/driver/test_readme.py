@@ -38,7 +38,7 @@ def test_first_result_is_that_of_the_commands() -> None:
     expected = unmarked(wrap(format_rows(page.rows())))
     shown = shown_after("assessed force")
     assert without_times(shown) == [
-        *without_times(expected), "Page: outputs/comparison/comparison.html"
+        *without_times(expected), "Results: outputs/comparison"
     ]  # fmt: skip
 
 

@@ -404,7 +404,7 @@ def test_missing_font_is_told(
 @pytest.mark.filterwarnings("ignore::thud.base.errors.ReportWarning")
 def test_report_replaces_no_file_of_others(one: Recording, tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("mine")
-    with pytest.raises(thud.InputError, match=naming("recording", 5)):
+    with pytest.raises(TypeError, match=naming("recording", "int")):
         thud.write_report(5, tmp_path)  # type: ignore[arg-type]
     for name in ("a\0b", "a\nb"):
         with pytest.raises(thud.InputError, match="one line"):

@@ -198,7 +198,9 @@ class Case(Immutable):
             keys = [key for key in kind.keys.values() if key.name in content.get(key.group, {})]
             values = {key.name: plain(content[key.group][key.name]) for key in keys}
             for name, value in values.items():
-                kind.keys[name].require(value)
+                # Empty lists are allowed where they are the default.
+                if value != () or getattr(kind, name) != ():
+                    kind.keys[name].require(value)
             attributes[attribute] = kind(**values)
         return cls(**attributes)
 
