@@ -1,6 +1,6 @@
 // Section of the source on the floor at an instant, and its animation, in step with the plot of the force.
-import { byId } from "./page.js";
-import { setCursor } from "./plot.js";
+import { byId } from "thud/page.js";
+import { setCursor } from "thud/plot.js";
 
 // Duration of the animation, ms.
 const DURATION = 5000;
