@@ -239,11 +239,9 @@ def test_pipe_among_checkpoints_is_not_opened(
     for path, content in WRITERS["sweep"].inputs.items():
         (tmp_path / path).write_text(str(content))
     (tmp_path / "out" / name).mkdir(parents=True)
-    for path in ("study", "block_000000000000.nc"):
-        os.mkfifo(tmp_path / "out" / name / path)
-        for more in ([], ["--replace"]):
-            assert command("sweep", *more) == 1
-        (tmp_path / "out" / name / path).unlink()
+    os.mkfifo(tmp_path / "out" / name / "block_000000000000.nc")
+    for more in ([], ["--replace"]):
+        assert command("sweep", *more) == 1
 
 
 @pytest.mark.parametrize("words", [["sweep"], ["fit"], ["run"], ["measure"], ["history"], ["rate"]])

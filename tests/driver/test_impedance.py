@@ -119,9 +119,9 @@ def test_bad_input_is_refused(shell: thud.Impact) -> None:
     )
     with pytest.raises(thud.InputError, match=naming("resistance", "ascend")):
         thud.ball_impedance(shell, resistance=[1e5, 1e4])
-    with pytest.raises(thud.InputError, match=naming("resistance", 1, "1.0e15 N s/m")):
+    with pytest.raises(thud.InputError, match=naming("resistance", 1, "1e15 N s/m")):
         thud.ball_impedance(shell, resistance=[0.0])
-    with pytest.raises(thud.InputError, match=naming("resistance", 1, "1.0e15 N s/m")):
+    with pytest.raises(thud.InputError, match=naming("resistance", 1, "1e15 N s/m")):
         thud.ball_impedance(shell, resistance=[np.nan])
     with pytest.raises(thud.InputError, match=naming("&sampling: duration", "0.05 s")):
         thud.ball_impedance(shell, resistance=[10.0])

@@ -200,7 +200,7 @@ def read_study(source: Source, kind: str = "sweep", case: Case | None = None) ->
         own = () if isinstance(source, Mapping) else (source,)
         alone = impact_only(study.case)
         if isinstance(alone.model, FiniteElement):
-            alone = with_values(alone, {"snapshot_interval": 0.0})
+            alone = replace(alone, model=replace(alone.model, snapshot_interval=0.0))
         study = replace(
             study,
             case=alone,
