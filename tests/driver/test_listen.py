@@ -103,15 +103,19 @@ def test_levels_by_another_instrument_are_those_predicted(
         bands[k] *= 4e-10 * 10 ** (prediction.level[k] / 10) / bands[k].max()
     octaves = level(octave_sums(bands))
     errors = level(octave_sums(library_histories(pressure, 3))) - octaves
-    title = "octaves of the sound below a floor, by PyOctaveBand"
-    oracle(title, "independent code", errors, 0.5, "dB")
+    oracle(
+        "octaves of the sound below a floor, by PyOctaveBand",
+        "independent code", errors, 0.5, "dB",
+    )  # fmt: skip
     # Filters of octaves also let through some of a louder octave beside theirs.
     above = level(library_histories(pressure, 1)) - octaves
     assert (above > -0.5).all()
     assert (above < 1.6).all()
     fast = fast_history(pyoctaveband.WeightingFilter(RATE, "A").filter(pressure))
-    title = "maximum A-weighted Fast level of the sound below a floor, by PyOctaveBand"
-    oracle(title, "independent code", level(fast) - level(a_weighting(CENTER) @ bands), 0.5, "dB")
+    oracle(
+        "maximum A-weighted Fast level of the sound below a floor, by PyOctaveBand",
+        "independent code", level(fast) - level(a_weighting(CENTER) @ bands), 0.5, "dB",
+    )  # fmt: skip
     # Class 1 filters of thud and of the library differ by their skirts, beside loud bands.
     assert only.reference.third[:n] == pytest.approx(room.level[i, j], abs=0.05)
     assert only.reference.third[n:] == pytest.approx(prediction.level[n:], abs=0.01)
@@ -226,8 +230,10 @@ def test_stated_level_is_that_of_its_own_file(oracle: Callable[..., None]) -> No
     weight = np.sqrt(a_weighting(np.fft.rfftfreq(2 * len(samples), 1 / rate)))
     fast = fast_history(np.fft.irfft(spectrum * weight)[: len(samples)])
     error = level(fast) - sound.sounds[0].level.a_weighted
-    title = "stated A-weighted level of a sound with modes below 50 Hz"
-    oracle(title, "closed form", error, 0.02, "dB")
+    oracle(
+        "stated A-weighted level of a sound with modes below 50 Hz",
+        "closed form", error, 0.02, "dB",
+    )  # fmt: skip
 
 
 def test_bands_that_cannot_be_reached_are_said(found: thud.RoomSound) -> None:

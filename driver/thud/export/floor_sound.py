@@ -15,6 +15,7 @@ from scipy.special import exprel
 from thud.base._schema import RATED_BANDS
 from thud.base.checks import refuse_value, require_whole
 from thud.base.display import Tabulated
+from thud.base.immutable import freeze
 from thud.base.note import Note
 from thud.floors.modal_room import modal_room
 from thud.floors.prediction import BANDS, RoomPrediction
@@ -337,7 +338,7 @@ def _maximum_levels(histories: Array, pressure: Array, n_known: int) -> SoundLev
     weights = _a_weighting(np.sqrt(lower * upper)[n_known:]) ** 2
     weighted = _fast_history(known**2) + weights @ histories[n_known:]
     octaves = histories.reshape(-1, 3, histories.shape[1]).sum(axis=1)
-    return SoundLevels(_level(histories), _level(octaves), float(_level(weighted)))
+    return SoundLevels(freeze(_level(histories)), freeze(_level(octaves)), float(_level(weighted)))
 
 
 def _level(history: Array) -> Array:
