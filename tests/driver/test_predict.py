@@ -224,7 +224,7 @@ def test_pdf_has_two_pages_with_the_rating(floor: PredictedFloor, page: Path) ->
     first, second = (sheet.get_textpage().get_text_bounded() for sheet in document)
     assert str(floor.prediction.rating) in " ".join(first.split())
     assert "Assumptions" in first
-    assert all(warning[:40] in " ".join(first.split()) for warning in floor.prediction.warnings)
+    assert all(str(note)[:40] in " ".join(first.split()) for note in floor.prediction.notes)
     assert "What would change it" in f"{first}{second}"
     assert "end of report" in second
     for sheet in document:

@@ -209,8 +209,14 @@ def measure_drop(
         name: estimates[name] for name in (IMPULSE, BOUNCES) if math.isfinite(estimates[name].value)
     }
     drop = Drop(
-        section.name, onset, contact, contact_time, estimates[RESTITUTION], peak_force, impulse,
-        estimates[MASS], restitutions, shared,
+        section.name, onset, contact,
+        contact_time=contact_time,
+        restitution=estimates[RESTITUTION],
+        peak_force=peak_force,
+        impulse=impulse,
+        effective_mass=estimates[MASS],
+        restitutions=restitutions,
+        shared_effects=shared,
         bounce=landing.value - contact.touch.value if landing else None,
         notes=tuple(replace(note, subject=note.subject or section.name) for note in notes),
         ringing=ringing,
