@@ -50,7 +50,6 @@ assert target.compare().size == 6
 recording = thud.read_recording(sys.argv[1], mass=2.5, height=1.0)
 assert abs(recording.quantity("mid_peak") / recording.peak_force - 0.5) < 0.4
 thud.write_report(recording, "report")
-assert "peak, 63 to 250 Hz" in open("report/report.html").read()
 assert "mid_peak" in open("report/report.json").read()
 from thud.explorer.answer import answer_case
 names = [name for name, *_ in answer_case(thud.Case(model=thud.HollowSphere()))["numbers"]]
