@@ -228,6 +228,7 @@ def test_interrupted_study_waits_for_no_block(tmp_path: Path) -> None:
     command = [*DRIVER, "sweep", "-q", "study.toml", "--workers", "2"]
     with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
         while not (tmp_path / "outputs/study/study.partial").exists():
+            assert process.poll() is None
             time.sleep(0.01)
         time.sleep(1.0)
         assert KEPT.match(ended(process, signal.SIGINT))
