@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from thud.base.note import Note
 
     # Values of a column, shape (n_row,), and their format; by title with unit, such as "level, dB".
-    Columns = Mapping[str, tuple[Iterable[Any], str]]
+    Columns = Mapping[str, tuple[Iterable[float | str], str]]
 
 _SYMBOL = re.compile(r"\b([CL])_(FE|I|iA,Fmax|n,w)\b")
 

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import chain, combinations, count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from tqdm import tqdm
@@ -151,7 +151,7 @@ def _cell(criterion: Criterion) -> str:
 
 # Values of a mapping are checked when they are used: mypy infers no type for several kinds.
 def compare(
-    impacts: Mapping[str, Any] | Iterable[Case | ImpactResult],
+    impacts: Mapping[str, object] | Iterable[Case | ImpactResult],
     force: LevelsForce | None = None,
     source: LimitsSource | None = None,
     *,

@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.base._schema import FloorOptions
-    from thud.base.display import Columns
     from thud.base.key import Key
     from thud.case.constructions import Construction, Layer
     from thud.floors.prediction import RoomPrediction
@@ -201,7 +200,7 @@ class PredictedFloor:
         result.sort(key=lambda change: (np.isnan(change.difference), -abs(change.difference)))
         return tuple(result)
 
-    def columns(self) -> Columns:
+    def columns(self) -> dict[str, tuple[Array, str]]:
         """Return the levels in bands, and what they follow from; NaN where edges do not matter."""
         prediction = self.prediction
         levels = prediction.source.levels(BANDS, force="floor")
