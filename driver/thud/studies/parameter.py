@@ -94,7 +94,7 @@ class Parameter(Plain):
         return coordinate_name(self.name, self.key)
 
     @property
-    def table(self) -> dict[str, Any]:
+    def table(self) -> dict[str, object]:
         """Its table in a study, without defaults."""
         words = (word for word in vars(self) if word not in {"name", "key"})
         return {w: vars(self)[w] for w in words if vars(self)[w] != getattr(Parameter, w)}
