@@ -57,19 +57,17 @@ def run_study(options: argparse.Namespace) -> int:
         raise error.within(options.study) from error
     for name, content in figures_of(options, {study.name: computed.plot}).items():
         replace_file(folder / name, content)
-    return _print(options, computed, folder, succeeded=True)
+    _print(options, computed, folder)
+    return 0
 
 
-def _print(
-    options: argparse.Namespace, result: SampleResult | Fit, folder: Path, *, succeeded: bool
-) -> int:
-    """Print results, their notes and their directory; return the exit code."""
+def _print(options: argparse.Namespace, result: SampleResult | Fit, folder: Path) -> None:
+    """Print results, their notes and their directory."""
     if not options.quiet:
         print_results(result.table())
     print_notes(f"{options.study}: {text}" for text in (*result.warnings, *result.notes))
     if not options.quiet:
         print_path("Results", folder)
-    return 0 if succeeded else NumericalError.exit_code
 
 
 for _name, _kind in KINDS.items():
@@ -134,4 +132,5 @@ def fit(options: argparse.Namespace) -> int:
         )  # fmt: skip
     except ThudError as error:
         raise error.within(options.study) from error
-    return _print(options, result, folder, succeeded=result.converged)
+    _print(options, result, folder)
+    return 0 if result.converged else NumericalError.exit_code
