@@ -12,19 +12,15 @@ from thud.base._schema import QUANTITIES, SAMPLE_QUANTITIES, FiniteElement
 from thud.base.checks import refuse
 from thud.case.case import Case
 from thud.case.keys import humanize
-from thud.explorer.criteria import (
-    RESULTS,
-    criterion_facts,
-    model_headline,
-)
-from thud.explorer.floor import floor_answer, room_answer, room_headline, section
+from thud.explorer.criteria import RESULTS, criterion_facts
+from thud.explorer.floor import floor_answer, room_answer, section
 from thud.explorer.messages import in_words
 from thud.explorer.motion import motion_of
 from thud.explorer.series import curve, to_json
 from thud.floors.prediction import predict_level
 from thud.impact.compute import compute
 from thud.impact.contact_time import contact_force
-from thud.level.levels import BANDWIDTHS, get_bands
+from thud.level.levels import BANDWIDTHS, STANDARDS, get_bands
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -85,15 +81,13 @@ def answer_case(case: Case) -> Answer:
     # A warning states that the error is unknown.
     if not math.isnan(error):
         answer["numbers"].append(["numerical error of an octave up to", error, "dB"])
-    answer["headline"] = model_headline(assessed)
     on_floor = impact.on_floor
     answer["motion"] = None if case.floor else motion_of(impact)
     answer["section"] = section(case)
     answer["floor"] = None if on_floor is None else floor_answer(impact, on_floor)
     if case.room is not None and case.floor is not None:
         prediction = predict_level(impact)
-        answer["room"] = room_answer(prediction) | {"source": answer["headline"]}
-        answer["headline"] = room_headline(prediction)
+        answer["room"] = room_answer(prediction)
         # Both name a source that does not conform.
         known = {note.code for note in notes}
         notes += [note for note in prediction.notes if note.code not in known]
@@ -120,6 +114,7 @@ def common_answer(
         },
         "criteria": [_criterion(criterion, verdict.source) for criterion in verdict.criteria],
         "result": RESULTS[verdict.conforms],
+        "limits": {"source": humanize(verdict.source), "standard": STANDARDS[verdict.source]},
         "numbers": _numbers(source),
         "warnings": [],
     }
@@ -143,18 +138,21 @@ def _criterion(criterion: Criterion, source: LimitsSource) -> Answer:
     """Return a criterion for the page, in its display unit."""
     quantity, estimate = criterion.quantity, criterion.estimate
     scale = quantity.display_scale
-    name, band = criterion.name.rpartition("octave_")[1:]
+    is_octave, band = criterion.name.rpartition("octave_")[1:]
     expanded = round(scale * estimate.expanded, 6)
+    is_open = criterion.conforms_if_stated != criterion.conforms
     # Numerical errors are often too small to be shown.
     smallest = 0.5 * 10.0**-quantity.decimals if criterion.is_computed else 0.0
     return {
-        "name": quantity.title if name else humanize(band),
-        "band": band.replace("_", ".") if name else "",
+        "name": quantity.title,
+        "band": band.replace("_", ".") if is_octave else "",
         "unit": quantity.display_unit,
         "value": None if np.isnan(criterion.value) else round(scale * criterion.value, 6),
         "value_text": quantity.show(criterion.value),
         "uncertainty": expanded if expanded > smallest and expanded < np.inf else None,
         "uncertainty_text": f"{scale * estimate.expanded:.{quantity.decimals}f}",
+        "mark": "",
+        "not_stated": list(estimate.not_stated) if is_open else [],
         "uncertainty_kind": "numerical" if criterion.is_computed else "measured",
         "lower": round(scale * criterion.lower, 6),
         "upper": round(scale * criterion.upper, 6),

@@ -62,15 +62,19 @@ def section(case: Case) -> Answer | None:
 
 
 def floor_answer(impact: Impact, on_floor: FloorImpact) -> Answer:
-    """Return force and velocity of a mobile floor, its quantities, and a table of octaves."""
+    """Return force and velocity of a mobile floor, its quantities, and a row for each octave.
+
+    A row has the mid frequency, Hz, levels of the force on a rigid floor and on this one, and their
+    difference, dB, and the energy into the floor, mJ.
+    """
     shown = np.flatnonzero(on_floor.time <= on_floor.touch_time + 2 * on_floor.contact_time)
     times = 1e3 * (on_floor.time - on_floor.touch_time)
     contact = contact_force(on_floor, "floor")
-    header, *rows = on_floor.rows()
-    energy = [
-        np.format_float_positional(1e3 * value, 3, fractional=False, trim="-")
-        for value in on_floor.injected_energy().energy
-    ]
+    injected = on_floor.injected_energy()
+    octaves = (
+        injected.frequency, on_floor.blocked_levels(), on_floor.levels(force="floor"),
+        on_floor.difference(), 1e3 * injected.energy,
+    )  # fmt: skip
     change = 20 * np.log10(on_floor.peak_force / impact.peak_force)
     return {
         "name": humanize(on_floor.floor.name),
@@ -82,15 +86,15 @@ def floor_answer(impact: Impact, on_floor: FloorImpact) -> Answer:
             ["maximum displacement", 1e6 * on_floor.floor_displacement.max(), "µm"],
             ["energy into the floor", 1e3 * on_floor.floor_work, "mJ"],
         ],
-        "header": [*header[:-1], "energy, mJ"],
-        "rows": [[*row[:-1], value] for row, value in zip(rows, energy, strict=True)],
+        "octaves": [to_json(row) for row in zip(*octaves, strict=True)],
     }
 
 
 def room_answer(prediction: RoomPrediction) -> Answer:
     """Return levels in the room below, dB, the room, m, m3 and s, and ratings with uncertainty.
 
-    Sides of a room that are not known are 0.
+    Sides of a room that are not known are 0. The result is the code of the verdict on a
+    requirement, or "level" without one.
     """
     room, floor = prediction.room, prediction.floor
     # Modes of a file have no sides.
@@ -98,13 +102,22 @@ def room_answer(prediction: RoomPrediction) -> Answer:
         getattr(room, side) or getattr(floor, side, 0.0) for side in ("length", "width")
     )
     height = prediction.volume / (length * width) if length and width else 0.0
+    required, rating = prediction.requirement, prediction.rating
+    details = (
+        rating_title(prediction, rating.name), verdict_text(prediction),
+        class_text(prediction.korean_class), source_note(prediction), CAVEAT,
+    )  # fmt: skip
     return {
+        "result": RESULTS[required.verdict] if required else "level",
+        "rounded": rating.rounded,
+        "uncertainty_of_rating": rating.uncertainty,
+        "chance": required.chance if required else "",
+        "detail": "; ".join(filter(None, details)),
         "frequency": to_json(prediction.frequency),
         "level": to_json(prediction.level),
         "uncertainty": to_json(prediction.uncertainty),
         "contributions": [
-            [CONTRIBUTIONS[name].title, value]
-            for name, value in prediction.rating.contributions.items()
+            [CONTRIBUTIONS[name].title, value] for name, value in rating.contributions.items()
         ],
         "size": {
             "length": length,
@@ -114,8 +127,8 @@ def room_answer(prediction: RoomPrediction) -> Answer:
             "reverberation_time": float(np.mean(prediction.reverberation_time)),
         },
         "ratings": [
-            [rating_title(prediction, name), rating.level, rating.uncertainty]
-            for name, rating in prediction.ratings.items()
+            [rating_title(prediction, name), other.level, other.uncertainty]
+            for name, other in prediction.ratings.items()
         ],
         "class": class_text(prediction.korean_class),
         "octaves": [
@@ -125,23 +138,3 @@ def room_answer(prediction: RoomPrediction) -> Answer:
             )
         ],
     }
-
-
-def room_headline(prediction: RoomPrediction) -> dict[str, str]:
-    """Return the headline of the level in a room, of its rating that is asked for.
-
-    It has the code of the result, words, causes, what narrow screens omit, and a detail.
-    """
-    required, rating = prediction.requirement, prediction.rating
-    level = words = f"{rating.rounded} dB"
-    why = f", standard uncertainty {rating.uncertainty:.1f} dB"
-    result = "level"
-    if required is not None:
-        result, words = RESULTS[required.verdict], f"{required.verdict}: {level}"
-        why += f"; {required.chance}"
-    parts = [
-        rating_title(prediction, rating.name), verdict_text(prediction),
-        class_text(prediction.korean_class), source_note(prediction), CAVEAT,
-    ]  # fmt: skip
-    detail = "; ".join(filter(None, parts))
-    return {"result": result, "words": words, "why": why, "also": "", "detail": detail}

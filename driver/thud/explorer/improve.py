@@ -14,7 +14,6 @@ from thud.base.errors import ThudError
 from thud.case.constructions import constructions
 from thud.case.keys import find_key, limits, value_in, with_values
 from thud.explorer.answer import new_case
-from thud.explorer.criteria import model_headline
 from thud.explorer.form import field_of, lower, shown
 from thud.explorer.models import facts_of
 from thud.floors.prediction import predict_level
@@ -106,12 +105,10 @@ def _improve_source(case: Case) -> Work:
         return _answer(changes, note=NOTE)
     if not names:
         return _answer(none="This model has no parameters to change.")
-    headline = model_headline(verdict)
-    reason = "".join(headline[part] for part in ("words", "why", "also"))
     tried = ", ".join(lower(field_of(case, name)["label"]) for name in names)
     none = (
         f"No change of a single parameter makes the source conform: tried {tried}, each from half "
-        f"to twice its value in steps of 6 %. It {reason}."
+        "to twice its value in steps of 6 %."
     )
     return _answer(none=none, note=NOTE)
 

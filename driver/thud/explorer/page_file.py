@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 FOLDER = resources.files("thud.explorer") / "page"
 # Modules of the first picture.
-FIRST = ("page", "storage", "request", "plot", "results", "first")
+FIRST = ("page", "storage", "request", "plot", "headline", "results", "first")
 # What an address of data may contain as it is.
 _SAFE = "".join(map(chr, range(32, 127))).translate({37: None, 35: None})
 # The page loads its own modules, and plays and shows what it has made or downloaded with its token.

@@ -22,6 +22,14 @@ if TYPE_CHECKING:
 
 BANDWIDTHS: tuple[BandSet, ...] = get_args(BandSet)
 SOURCES: tuple[LimitsSource, ...] = get_args(LimitsSource)
+# Standards that state the limits of a source.
+STANDARDS = {
+    "rubber_ball": (
+        "JIS A 1418-2:2019 (tables A.1 and A.2), ISO 10140-5:2021 (table F.1) and "
+        "ISO 16283-2:2020 (table A.1)"
+    ),
+    "tyre": "JIS A 1418-2:2019 (tables A.1 and A.2)",
+}
 LEVEL_METHODS: tuple[LevelsMethod, ...] = get_args(LevelsMethod)
 FORCES: tuple[LevelsForce, ...] = ("elastic", "floor")
 # Upper limit of the band of a force plate, Hz (paper, section 3).

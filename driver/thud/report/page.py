@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from thud.level.levels import STANDARDS
 from thud.plot.templates import render
 from thud.recordings.recorded_levels import BACKGROUND
 from thud.report.contents import json_bytes
@@ -32,13 +33,6 @@ if TYPE_CHECKING:
 MAX_IDENTITY = 70
 # Minimum number of drops for the test for outliers.
 MIN_DROPS = 3
-STANDARDS = {
-    "rubber_ball": (
-        "JIS A 1418-2:2019 (tables A.1 and A.2), ISO 10140-5:2021 (table F.1) and "
-        "ISO 16283-2:2020 (table A.1)"
-    ),
-    "tyre": "JIS A 1418-2:2019 (tables A.1 and A.2)",
-}
 # Construction that the standards give as an example, without limits.
 EXAMPLES = {"diameter": 0.18, "wall_thickness": 0.03}
 BUDGET_HEAD = (

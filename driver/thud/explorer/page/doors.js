@@ -1,6 +1,7 @@
 // The three doors: what each shows, its variants, and the actions on its answer.
 import { byId, button, element, saveFile } from "thud/page.js";
 import { setFragment } from "thud/request.js";
+import { resultOf } from "thud/headline.js";
 import { showAnswer, showFloors, showWarnings } from "thud/results.js";
 import { showBall } from "thud/ball.js";
 import { showRatings, showSection } from "thud/section.js";
@@ -230,7 +231,7 @@ function showFit({ values, text, details, name }) {
 
 /** Return the button that looks for a change that conforms or meets a requirement, if needed. */
 function improveButton(own) {
-  if (!own?.values || ["conforms", "level"].includes(own.answer.headline.result)) return [];
+  if (!own?.values || ["conforms", "level"].includes(resultOf(own.answer))) return [];
   const title = own.answer.room ? `Change that meets ${own.values.room.required} dB` : "Smallest change that conforms";
   return [button(title, () => improve(title), { id: "improve" })];
 }

@@ -1,40 +1,35 @@
 // Display of answers: headline, plots, criteria, floor, room and warnings.
 import {
-  byId, capitalize, element, fillTable, minus, rounded, signed, withSymbols,
+  byId, capitalize, digits, element, fillTable, minus, rounded, signed, withSymbols,
 } from "thud/page.js";
+import { VERDICTS, headlineOf, limitsText, marginOf, resultOf, uncertaintyText } from "thud/headline.js";
 import { plot, swatch } from "thud/plot.js";
 
 // Uncertainties by their codes.
 const UNCERTAINTIES = {
   numerical: "numerical error of the computation", measured: "measurement uncertainty (95 %)",
 };
-// Verdicts on a source, and signs, by the code of the result.
-export const SOURCE_VERDICTS = {
-  conforms: "conforms", does_not_conform: "does not conform", undecided: "undecided",
-};
+// Signs by the code of the result.
 const SIGNS = { conforms: "✓", does_not_conform: "✕", undecided: "?", level: "" };
 // Titles of the force by its code.
 const FORCES = { elastic: "Elastic force", floor: "Force on the floor" };
+// Heads of the table of the floor.
+const OCTAVE_HEADS = ["Octave, Hz", "Rigid floor, dB", "This floor, dB", "Difference, dB", "Energy, mJ"];
 // Uncertainties that are smaller are not drawn, dB.
 const MIN_UNCERTAINTY = 0.02;
-
-/** Return the headline of an answer as a text. */
-export const headlineText = ({ headline: { words, why, also } }) => `${words}${why}${also}`;
-
-const uncertaintyText = ({ uncertainty, uncertainty_text: text, mark }) =>
-  `± ${text ?? Number(uncertainty.toPrecision(2))} ${mark ?? ""}`.trim();
 
 /** Show the answer to the question; `variant` has a label and an answer. */
 function showHeadline({ label, answer }) {
   // Narrow screens leave further criteria to the table.
-  const { result, words, why, also, detail } = answer.headline;
+  const { words, why, also, detail } = headlineOf(answer);
+  const result = resultOf(answer);
   byId("verdict").className = result;
   byId("verdict").replaceChildren(
     ...(SIGNS[result] ? [element("span", { class: "sign", "aria-hidden": "true" }, SIGNS[result])] : []),
     element("span", { class: "subject" }, `${label} `),
     element("b", {}, capitalize(words)),
     element("span", { class: "why" }, why, element("span", { class: "wide" }, also)));
-  byId("detail").replaceChildren(...withSymbols(detail ?? ""));
+  byId("detail").replaceChildren(...withSymbols(detail));
   // Narrow screens name the case here.
   if (SIGNS[result]) byId("detail").dataset.subject = label;
   else delete byId("detail").dataset.subject;
@@ -112,14 +107,9 @@ export function nameOf(variants, { style, label }, text) {
   return variants.length > 1 ? [swatch(style), ` ${label}`] : [text];
 }
 
-/** Return the distance of a value from the nearer limit, negative outside. */
-function marginOf(criterion) {
-  return Math.min(criterion.value - criterion.lower, criterion.upper - criterion.value);
-}
-
 function missedSide(criterion) {
   if (criterion.value === null) return "not known";
-  if (criterion.result === "undecided") return SOURCE_VERDICTS.undecided;
+  if (criterion.result === "undecided") return VERDICTS.undecided;
   if (marginOf(criterion) >= 0) return "";
   return criterion.value < criterion.lower ? "low" : "high";
 }
@@ -136,24 +126,24 @@ function showCriteria(variants) {
     const text = isExact ? "" : signed(marginOf(criterion), criterion.unit);
     return element("td", { class: "margin" }, `${text} ${missedSide(criterion)}`);
   };
-  const [{ answer: { criteria, motion } }, ...others] = variants;
+  const [{ answer: { criteria, limits, motion } }, ...others] = variants;
   const head = (variant) => nameOf(variants, variant, "Value");
   fillTable("criteria", ["Criterion", "Limits", head(variants[0]),
     element("th", { scope: "col", class: "margin" }, "Margin"), ...others.map(head)],
   criteria.map((criterion, i) => [
-    term(criterion), [...new Set([criterion.lower, criterion.upper])].join(" to "), valueOf(criterion),
+    term(criterion, limits), limitsText(criterion), valueOf(criterion),
     marginCell(criterion), ...others.map(({ answer }) => valueOf(answer.criteria[i]))]));
   byId("criteria_section").classList.toggle("half", Boolean(motion) && variants.length < 3);
   const stated = variants.flatMap(({ answer }) => answer.criteria.filter((entry) => entry.uncertainty));
   const kinds = [...new Set(stated.map((entry) => UNCERTAINTIES[entry.uncertainty_kind]))];
   const text = kinds.length ? `±: ${kinds.join("; ")}. ` : "";
-  byId("criteria_text").textContent = `${text}${criteria[0].standard}`;
+  byId("criteria_text").textContent = `${text}${limits.standard}`;
 }
 
 /** Return the name of a criterion, which opens its explanation. */
-function term(criterion) {
+function term(criterion, { standard }) {
   const name = capitalize(criterion.name) + (criterion.unit ? `, ${criterion.unit}` : "");
-  const { explanation, limit_source: limits, standard } = criterion;
+  const { explanation, limit_source: limits } = criterion;
   const lines = [["", explanation], ["Limits: ", limits], ["Standard: ", standard]];
   return element("details", { class: "term" }, element("summary", {}, name),
     ...lines.map(([title, text]) => element("p", {}, element("b", {}, title), ...withSymbols(text))));
@@ -164,7 +154,7 @@ export function showFloors(variants) {
   const floors = variants.filter((variant) => variant.answer.floor);
   byId("floor_section").hidden = !variants[0].answer.floor;
   if (!variants[0].answer.floor) return;
-  const { name, header, rows } = floors[0].answer.floor;
+  const { name, octaves } = floors[0].answer.floor;
   byId("floor_title").textContent = `Floor response: ${name}`;
   plot(byId("velocity"), {
     title: "Velocity of the floor",
@@ -172,11 +162,11 @@ export function showFloors(variants) {
       ({ name: label, style, x: velocity.time, y: velocity.value })),
     x: { title: "Time", unit: "ms" }, y: { title: "Velocity of the floor", unit: "mm/s", zero: true },
   });
-  const quantity = ([title, value, unit]) =>
-    `${title} ${unit === "dB" ? `${signed(value, unit)} dB` : rounded(value, unit)}`;
+  const quantity = ([title, value, unit]) => `${title} ${rounded(value, unit)}`;
   byId("floor_text").replaceChildren(...floors.map((variant) => element("li", {},
     ...nameOf(variants, variant, ""), ` ${variant.answer.floor.numbers.map(quantity).join("; ")}`)));
-  fillTable("floor_table", header.map(capitalize), rows.map((cells) => cells.map(minus)));
+  fillTable("floor_table", OCTAVE_HEADS, octaves.map(([band, ...levels]) =>
+    [String(band), ...levels.map((value, i) => digits(value, i < 3 ? "dB" : "mJ"))]));
 }
 
 /** Show headline, plots and criteria of variants, of which the first is the answer of its door. */

@@ -1,7 +1,7 @@
 // Variants: what they are called, by what differs, and their table.
 import { button, capitalize, element, fillTable, minus, scaled, signed } from "thud/page.js";
 import { STYLES, swatch } from "thud/plot.js";
-import { SOURCE_VERDICTS, headlineText } from "thud/results.js";
+import { VERDICTS, headlineText } from "thud/headline.js";
 import { about, defaultOf, factsOf, findField } from "thud/form.js";
 
 // Words of keys in names, if shorter than their labels.
@@ -106,13 +106,11 @@ function wordsOf(key, values, hasBase) {
 export function showVariants(variants, { remove, rename }) {
   const [first, ...others] = variants;
   const isRoom = variants.every(({ answer }) => answer.room);
-  const sourceOf = ({ answer }) => (answer.room?.source ?? answer.headline).result;
-  const verdict = (variant) =>
-    element("td", { class: sourceOf(variant) }, SOURCE_VERDICTS[sourceOf(variant)]);
-  const level = ({ answer }) => element("td", { class: answer.room && answer.headline.result },
-    answer.room ? headlineText(answer) : "–");
+  const verdict = ({ answer: { result } }) => element("td", { class: result }, VERDICTS[result]);
+  const level = ({ answer }) =>
+    element("td", { class: answer.room?.result }, answer.room ? headlineText(answer) : "–");
   const hasLevel = variants.some(({ answer }) => answer.room);
-  const hasVerdict = !isRoom || variants.some((variant) => sourceOf(variant) !== "conforms");
+  const hasVerdict = !isRoom || variants.some(({ answer }) => answer.result !== "conforms");
   const texts = [
     ...(hasVerdict ? [[hasLevel ? "Source" : "Verdict", verdict]] : []), ...(hasLevel ? [["Level", level]] : []),
   ];
