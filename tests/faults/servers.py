@@ -16,7 +16,7 @@ from contextlib import closing
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
-from urllib.parse import quote, urlsplit
+from urllib.parse import urlsplit
 
 import psutil
 from campaign import Finding
@@ -170,8 +170,13 @@ def _hostile_case(server: Explorer, chance: random.Random) -> str:
 def _hostile_record(server: Explorer, chance: random.Random) -> str:
     name = chance.choice(["a.wav", "../../a.csv", "a.mat", "x" * 300 + ".tdms", ".uff", "a\0.csv"])
     body = chance.choice([b"", b"RIFF" + chance.randbytes(200), b"0,1\n" * 100, b"\xff" * 5000])
-    query = f"name={quote(name)}&height={chance.choice(['1', 'nan', 'x', '-1', '1e999'])}"
-    return _judged(*server.ask(f"/measure?{query}", body))
+    height = chance.choice(["1", "NaN", "x", "-1", "1e999"])
+    part = "--edge\r\nContent-Disposition: form-data; name="
+    table = f'{part}"table"\r\n\r\n{{"height": {height}}}\r\n'
+    file = f'{part}"file"; filename="{name}"\r\n\r\n'
+    form = f"{table}{file}".encode() + body + b"\r\n--edge--\r\n"
+    kind = {"Content-Type": "multipart/form-data; boundary=edge"}
+    return _judged(*server.ask("/measure", form, **kind))
 
 
 def _hostile_request(server: Explorer, chance: random.Random) -> str:
@@ -216,7 +221,7 @@ def _leave(server: Explorer, chance: random.Random) -> str:
     before = process.memory_info().rss
     bodies = [json.dumps(LONG).encode(), _case(1.0, "hollow_sphere"), _case(1.0, "modal_ball")]
     for _ in range(chance.choice([1, 10, 60])):
-        path = chance.choice(["/solve", "/solve", "/download/report.html"])
+        path = chance.choice(["/solve", "/solve", "/download/force.csv"])
         with server.begin(path, chance.choice(bodies)):
             time.sleep(chance.choice([0, chance.uniform(0, 0.1)]))
     if chance.random() < 0.3:

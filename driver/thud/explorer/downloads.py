@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import io
+from base64 import b64encode
 from pprint import pformat
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,21 +21,14 @@ if TYPE_CHECKING:
     Values = dict[str, dict[str, Any]]
 
 
-class Download(NamedTuple):
-    """Content of a file; of a sound also its full scale, Pa."""
-
-    content: bytes
-    full_scale: float | None = None
-
-
-def namelist(values: Values) -> Download:
+def namelist(values: Values) -> str:
     """Return the case as a namelist file."""
     case = new_case(values)
     check_case(case)
-    return Download(f"{case.to_namelist()}\n".encode())
+    return f"{case.to_namelist()}\n"
 
 
-def script(values: Values) -> Download:
+def script(values: Values) -> str:
     """Return a Python script that computes the case."""
     check_case(new_case(values))
     shown = pformat(values, width=90, sort_dicts=False)
@@ -43,10 +37,10 @@ def script(values: Values) -> Download:
     lines += ["print(impact.assess())"]
     if {"floor", "room"} <= values.keys():
         lines += ["print(thud.predict_level(impact))"]
-    return Download(("\n".join(lines) + "\n").encode())
+    return "\n".join(lines) + "\n"
 
 
-def force(values: Values) -> Download:
+def force(values: Values) -> str:
     """Return time and assessed force as comma-separated values."""
     impact = compute(new_case(values))
     table = io.StringIO()
@@ -58,19 +52,19 @@ def force(values: Values) -> Download:
         header="time_s,force_N",
         comments="",
     )
-    return Download(table.getvalue().encode())
+    return table.getvalue()
 
 
-def sound(values: Values) -> Download:
-    """Return the sound in the room below as a WAV file."""
+def sound(values: Values) -> dict[str, Any]:
+    """Return the sound in the room below: a WAV file in base 64, and its full scale, Pa."""
     heard = listen(predict_level(compute(new_case(values))))
-    return Download(heard.wav(), heard.full_scale)
+    return {"wav": b64encode(heard.wav()).decode(), "full_scale": heard.full_scale}
 
 
-# Function that returns the file, and media type, by the name of the file.
-DOWNLOADS: dict[str, tuple[Callable[[Values], Download], str]] = {
-    "case.nml": (namelist, "text/plain"),
-    "case.py": (script, "text/x-python"),
-    "force.csv": (force, "text/csv"),
-    "room.wav": (sound, "audio/wav"),
+# Functions that return the content, by the name of the file.
+DOWNLOADS: dict[str, Callable[[Values], object]] = {
+    "case.nml": namelist,
+    "case.py": script,
+    "force.csv": force,
+    "room.wav": sound,
 }

@@ -41,7 +41,7 @@ TASKS: dict[str, Callable[..., Any]] = {
     "improve": improve,
     "fit": fit_recording,
     "press": fit_press,
-    "download": lambda name, values: DOWNLOADS[name][0](values),
+    **DOWNLOADS,
 }
 # Errors of invalid values; values of wrong types raise TypeError or ValueError when they are used.
 INPUT_ERRORS = (ThudError, TypeError, ValueError, KeyError, OverflowError)
@@ -115,11 +115,6 @@ class Jobs:
                         _kill(process)
         # The slot is released before this report, as the caller may read it slowly.
         yield report
-
-    def close(self) -> None:
-        """Kill the idle processes."""
-        while self._idle:
-            _kill(self._idle.pop()[0])
 
     def _take(self) -> tuple[ForkServerProcess, Connection, Connection | None]:
         """Return a process, its connection, and the child's end if the process is new."""

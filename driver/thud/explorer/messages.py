@@ -55,7 +55,7 @@ def in_words(note: Note) -> str:
         if "low_open" in others and not math.isnan(note.low + note.value):
             text = _out_of_range(note, field)
     elif item:
-        name = item.quoted
+        name = f"“{item.label}”"
         if item.unit == PERCENT and not math.isnan(note.low + note.value):
             value, low, high = (f"{100 * number:g}" for number in (note.value, note.low, note.high))
             text = f"= {value} is not allowed; allowed: {low} to {high}"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from thud.base.checks import refuse
 from thud.base.toml_tables import read_toml
 from thud.explorer.answer import common_answer
-from thud.explorer.criteria import largest_contribution, recording_headline
+from thud.explorer.criteria import largest_contribution
 from thud.explorer.decisive import decisive_warnings
 from thud.explorer.recording_fields import TABLES
 from thud.impact.contact_time import contact_force
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 LABORATORY = ".toml"
 
 
-def answer_recording(paths: Sequence[str], table: Mapping[str, object]) -> dict[str, Any]:
+def answer_recording(paths: Sequence[str], table: Mapping[str, Any]) -> dict[str, Any]:
     """Return the answer of recorded drops of one source.
 
     `paths` are copies of the files with their names, in one folder, and `table` is a table of the
@@ -48,15 +48,9 @@ def answer_recording(paths: Sequence[str], table: Mapping[str, object]) -> dict[
         entry["value_text"] = value_text(row)
         entry["uncertainty_text"] = expanded_text(row)
         entry["mark"] = INCOMPLETE if row["excluded"] else ""
-    excluded = excluded_text(rows, "The uncertainty")
-    shown = {
-        criterion.name: " ".join(filter(None, (
-            entry["value_text"], "±", entry["uncertainty_text"], entry["mark"], entry["unit"]
-        )))
-        for entry, criterion in zip(answer["criteria"], verdict.criteria, strict=True)
-        if entry["uncertainty"]
-    }  # fmt: skip
-    answer["headline"] = recording_headline(verdict, shown, excluded, is_stated="source" in table)
+    answer["excluded"] = excluded_text(rows, "The uncertainty")
+    answer["largest"] = largest_contribution(verdict) or ()
+    answer["limits"]["assumed"] = "source" not in table
     answer["drops"] = len(recording.drops)
     answer["asks"] = _asks(recording, verdict)
     # The page shows the name of a single file next to its warnings.
@@ -71,13 +65,13 @@ def answer_recording(paths: Sequence[str], table: Mapping[str, object]) -> dict[
     return answer
 
 
-def calibration_report(paths: Sequence[str], table: Mapping[str, object]) -> str:
+def calibration_report(paths: Sequence[str], table: Mapping[str, Any]) -> str:
     """Return the page with the calibration report of recorded drops, as `answer_recording`."""
     recording = read_copies(paths, table)
     return report_page(report_data(recording), draw_figures(recording).values())
 
 
-def read_copies(paths: Sequence[str], table: Mapping[str, object]) -> Recording:
+def read_copies(paths: Sequence[str], table: Mapping[str, Any]) -> Recording:
     """Return the recording in copies of files, whose folder becomes the working directory.
 
     So messages name the files without the folder. Raise InputError if they are no recording.
@@ -96,19 +90,22 @@ def _is_laboratory(name: str) -> bool:
     return Path(name).suffix.lower() == LABORATORY
 
 
-def _config_of(paths: Sequence[str], table: Mapping[str, object]) -> Config:
+def _config_of(paths: Sequence[str], table: Mapping[str, Any]) -> Config:
     """Return the configuration of files of a laboratory, at most one, and of a table."""
     if len(paths) > 1:
         refuse(f"{', '.join(paths)}: are {len(paths)} files of laboratories", "one")
-    if not paths:
-        return config_from(table)
-    stated, _ = read_toml(Path(paths[0]))
-    config = config_from(stated, paths[0])
+    stated: dict[str, Any] = {}
+    for path in paths:
+        stated, _ = read_toml(Path(path))
+        # Its errors name the file.
+        config_from(stated, path)
+    both = {
+        name: {**stated[name], **table[name]} for name in TABLES if name in stated and name in table
+    }
+    config = config_from({**stated, **table, **both})
     if config.report.accreditation_mark:
-        refuse(f"{paths[0]}: accreditation_mark cannot be sent by a page", "thud-driver measure")
-    stated_tables = {name: stated[name] for name in TABLES if name in stated and name in table}
-    merged = {name: {**keys, **table[name]} for name, keys in stated_tables.items()}  # type: ignore[dict-item]
-    return config_from({**stated, **table, **merged})
+        refuse("accreditation_mark cannot be sent by a page", "thud-driver measure")
+    return config
 
 
 def _asks(recording: Recording, verdict: Verdict) -> list[dict[str, Any]]:

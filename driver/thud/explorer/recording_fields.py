@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from thud.base.checks import refuse, require_choice, shown
+from thud.base.checks import require_choice
 from thud.case.keys import humanize
 from thud.recordings.config import Config
 from thud.recordings.response import Plate, RecorderFilter
@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
 
     from thud.base.toml_tables import TomlTable
-
-    Table = dict[str, Any]
 
 # Tables of a configuration; the names of their fields begin with that of the table.
 TABLES: dict[str, type[TomlTable]] = {"plate": Plate, "filter": RecorderFilter}
@@ -42,6 +40,8 @@ class Field:
     ----------
     name : str
         Name of the key, after that of its table and an underscore if it has one.
+    path : tuple of str
+        Name of the table, if any, and of the key.
     label : str
         Name of the field on the page and in messages, with its unit.
     kind : str
@@ -49,84 +49,48 @@ class Field:
     unit : str
         Unit of a number: that of the key, or ``"%"`` for a fraction.
     hint : str
-        What is shown in the empty field, such as an example.
-    choices : mapping
+        What is shown in the empty field of a text, such as an example.
+    choices : mapping or None
         Texts of the allowed values, if they are a choice.
     folded : bool
         Whether the field is among those that are folded away.
     """
 
     name: str
+    path: tuple[str, ...]
     label: str
-    kind: str = "number"
-    unit: str = ""
-    hint: str = ""
-    choices: Mapping[str, str] = field(default_factory=dict)
-    folded: bool = False
-
-    @property
-    def quoted(self) -> str:
-        """Name of the field in a message."""
-        return f"“{self.label}”"
-
-    @property
-    def path(self) -> tuple[str, str]:
-        """Name of the table, empty if the key is in none, and name of the key."""
-        table, _, key = self.name.partition("_")
-        return (table, key) if table in TABLES else ("", self.name)
+    kind: str
+    unit: str
+    hint: str
+    choices: Mapping[str, str] | None
+    folded: bool
 
     @property
     def key(self) -> str:
         """Name of the key in messages on a configuration."""
-        return ": ".join(filter(None, self.path))
-
-    def value(self, text: str) -> object:
-        """Return the value of the key; raise InputError for a text that is not a number."""
-        if self.kind != "number":
-            return text
-        try:
-            number = float(text)
-        except ValueError as error:
-            refuse(f"= {shown(text)} is not a number", "a number", error, name=self.key)
-        if self.unit == PERCENT:
-            return number / 100
-        return int(number) if number.is_integer() else number
+        return ": ".join(self.path)
 
 
 def _fields() -> Iterator[Field]:
     """Yield the fields, from the declarations of their keys."""
     for name in (*SHOWN, *FOLDED):
-        table, key = Field(name, "").path
-        owner = TABLES[table] if table else Config
-        declared = next(entry.metadata for entry in fields(owner) if entry.name == key)
-        check, hint = declared["check"], declared["hint"]
-        label = OWNERS.get(table, "") + declared["title"]
-        label = label[:1].upper() + label[1:].replace(" -", " −")
-        if not isinstance(check, partial):
-            yield Field(name, label, "text", hint=hint, folded=name in FOLDED)
-        elif check.func is require_choice:
-            choices = {word: humanize(word) for word in check.keywords["allowed"]}
-            yield Field(name, label, "choice", choices=choices, folded=name in FOLDED)
-        else:
+        table, _, key = name.partition("_")
+        path = (table, key) if table in TABLES else (name,)
+        owner = TABLES.get(path[0], Config)
+        declared = next(entry.metadata for entry in fields(owner) if entry.name == path[-1])
+        check = declared["check"]
+        kind, unit, choices = "text", "", None
+        if isinstance(check, partial) and check.func is require_choice:
+            kind, choices = "choice", {word: humanize(word) for word in check.keywords["allowed"]}
+        elif isinstance(check, partial):
             # Uncertainties without a unit are relative.
-            unit = check.keywords.get("unit") or (
-                PERCENT if "uncertainty" in key.split("_") else ""
-            )
-            label = ", ".join(filter(None, (label, unit)))
-            yield Field(name, label, unit=unit, folded=name in FOLDED)
+            relative = PERCENT if "uncertainty" in key.split("_") else ""
+            kind, unit = "number", check.keywords.get("unit") or relative
+        title = OWNERS.get(path[0], "") + declared["title"]
+        title = title[:1].upper() + title[1:].replace(" -", " −")
+        label = ", ".join(filter(None, (title, unit)))
+        hint = declared["hint"] if kind == "text" else ""
+        yield Field(name, path, label, kind, unit, hint, choices, name in FOLDED)
 
 
 FIELDS = tuple(_fields())
-
-
-def recording_table(stated: Mapping[str, str]) -> Table:
-    """Return the table of a configuration from the texts of fields, by name.
-
-    Raise InputError for a text that is not a number.
-    """
-    result: Table = {}
-    for item in FIELDS:
-        if item.name in stated:
-            table, key = item.path
-            (result.setdefault(table, {}) if table else result)[key] = item.value(stated[item.name])
-    return result

@@ -7,7 +7,7 @@ import re
 import secrets
 import shutil
 import socket
-from contextlib import AsyncExitStack, aclosing, asynccontextmanager
+from contextlib import AsyncExitStack, aclosing
 from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -16,13 +16,12 @@ from typing import TYPE_CHECKING, Any
 import anyio
 import uvicorn
 from starlette.applications import Starlette
-from starlette.datastructures import MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
 from starlette.middleware.gzip import GZipMiddleware
 from starlette.middleware.trustedhost import TrustedHostMiddleware
 from starlette.requests import ClientDisconnect
-from starlette.responses import HTMLResponse, JSONResponse, Response, StreamingResponse
+from starlette.responses import HTMLResponse, JSONResponse, StreamingResponse
 from starlette.routing import Mount, Route
 from starlette.staticfiles import StaticFiles
 
@@ -37,14 +36,15 @@ from thud.explorer.messages import describe_error
 from thud.explorer.models import floor_facts, model_facts
 from thud.explorer.page_file import first_answer, render_page
 from thud.explorer.presets import presets
-from thud.explorer.recording_fields import FIELDS, recording_table
+from thud.explorer.recording_fields import FIELDS
 
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator, Awaitable, Callable, Mapping, Sequence
 
     from starlette.datastructures import UploadFile
     from starlette.requests import Request
-    from starlette.types import ASGIApp, Message, Receive, Scope, Send
+    from starlette.responses import Response
+    from starlette.types import Receive, Scope, Send
 
     Endpoint = Callable[[Request], Awaitable[Response]]
     Reports = AsyncGenerator[dict[str, Any], None]
@@ -56,9 +56,6 @@ MAX_RECORDING = 200_000_000
 FILE_KEYS = [(key.group, key.name) for key in KEYS if key.kind == "text" and key.group != "case"]
 # Maximum length of the name of a copy of a file, of up to four bytes a character.
 MAX_NAME = 50
-# Maximum number of files and of fields in a form.
-MAX_FILES = 100
-MAX_FIELDS = 100
 # Maximum number of requests at a time, time that an idle connection stays open, s, and maximum size
 # of the head of a request, bytes.
 MAX_REQUESTS = 500
@@ -66,19 +63,18 @@ IDLE_TIME = 10
 MAX_HEAD = 16_384
 # Header that carries the token.
 TOKEN = "x-thud-token"  # noqa: S105 - its name
-# Header of a downloaded sound with its full scale, Pa.
-FULL_SCALE = "x-thud-full-scale"
 # Level of compression: higher ones save a few percent and take twice as long.
 COMPRESSION = 6
 # Time limits of a task and of a task that is expected to be quick, s; after that it runs again as a
 # slow task.
 TIME_LIMIT = 300.0
 QUICK_TIME_LIMIT = 1.0
-HEADERS = {
-    "Content-Security-Policy": "default-src 'none'; frame-ancestors 'none'",
-    "X-Content-Type-Options": "nosniff",
-    "Referrer-Policy": "no-referrer",
-}
+# Headers of all responses; the page has its own policy.
+HEADERS = [
+    ("Cache-Control", "no-cache"),
+    ("X-Content-Type-Options", "nosniff"),
+    ("Referrer-Policy", "no-referrer"),
+]
 
 
 def new_application(
@@ -100,13 +96,6 @@ def new_application(
     """
     if not token:
         refuse("the token is empty", "a secret text")
-    quick = Jobs(2 * width, QUICK_TIME_LIMIT, late={"answer": None}, reuse=True)
-
-    @asynccontextmanager
-    async def lifespan(_: Starlette) -> AsyncGenerator[None, None]:
-        yield
-        quick.close()
-
     application = Starlette(
         routes=[
             Route("/", _page),
@@ -116,24 +105,22 @@ def new_application(
                 Route(path, _guarded(endpoint, limit), methods=["POST"])
                 for path, endpoint, limit in (
                     ("/solve", _solve, MAX_CASE),
-                    ("/improve", _improve, MAX_CASE),
-                    ("/download/{name}", _download, MAX_CASE),
-                    ("/measure", _with_files("recording", recording_table), MAX_RECORDING),
-                    ("/report", _with_files("report", recording_table), MAX_RECORDING),
-                    ("/fit", _with_files("fit", recording_table, has_case=True), MAX_RECORDING),
-                    ("/press", _with_files("press", has_case=True), MAX_RECORDING),
+                    ("/improve", _with_case("improve"), MAX_CASE),
+                    *((f"/download/{name}", _with_case(name), MAX_CASE) for name in DOWNLOADS),
+                    ("/measure", _with_files("recording", "table"), MAX_RECORDING),
+                    ("/report", _with_files("report", "table"), MAX_RECORDING),
+                    ("/fit", _with_files("fit", "table", "case"), MAX_RECORDING),
+                    ("/press", _with_files("press", "case"), MAX_RECORDING),
                 )
             ),
         ],
         middleware=[
-            Middleware(_WithHeaders),
             Middleware(TrustedHostMiddleware, allowed_hosts=list(hosts)),
             Middleware(GZipMiddleware, compresslevel=COMPRESSION),
         ],
         exception_handlers=dict.fromkeys(
             (*INPUT_ERRORS, HTTPException, ClientDisconnect), _report_error
         ),
-        lifespan=lifespan,
     )
     floors = floor_facts()
     application.state.about = {
@@ -155,7 +142,7 @@ def new_application(
     ]
     application.state.token = token
     application.state.slow = Jobs(width, TIME_LIMIT)
-    application.state.quick = quick
+    application.state.quick = Jobs(2 * width, QUICK_TIME_LIMIT, late={"answer": None}, reuse=True)
     return application
 
 
@@ -169,59 +156,52 @@ async def _about(request: Request) -> Response:
 
 
 async def _solve(request: Request) -> Response:
-    values, state = _groups(request, await request.body()), request.app.state
-    report = await _last_report(request, state.quick.run("quick case", values))
-    if "error" not in report and report.get("answer") is None:
-        return _Reports(state.slow.run("case", values), AsyncExitStack())
-    return _json(report)
+    values, state = _case(request, await request.body()), request.app.state
+
+    async def reports() -> Reports:
+        """Yield the quick answer alone, or the reports of a slow task."""
+        async with aclosing(state.quick.run("quick case", values)) as quick:
+            async for report in quick:
+                if report.get("answer") or "error" in report:
+                    yield report
+                    return
+        async with aclosing(state.slow.run("case", values)) as slow:
+            async for report in slow:
+                yield report
+
+    return _Reports(reports(), AsyncExitStack())
 
 
-async def _improve(request: Request) -> Response:
-    values = _groups(request, await request.body())
-    return _Reports(request.app.state.slow.run("improve", values), AsyncExitStack())
+def _with_case(task: str) -> Endpoint:
+    """Return an endpoint that sends the reports of a slow task on a case."""
+
+    async def answer(request: Request) -> Response:
+        values = _case(request, await request.body())
+        return _Reports(request.app.state.slow.run(task, values), AsyncExitStack())
+
+    return answer
 
 
-async def _download(request: Request) -> Response:
-    if (name := request.path_params["name"]) not in DOWNLOADS:
-        raise HTTPException(404, "there is no such file")
-    values = _groups(request, await request.body())
-    report = await _last_report(request, request.app.state.slow.run("download", name, values))
-    if "answer" not in report:
-        return _json(report)
-    content, full_scale = report["answer"]
-    headers = {} if full_scale is None else {FULL_SCALE: repr(full_scale)}
-    return Response(content, media_type=DOWNLOADS[name][1], headers=headers)
-
-
-def _with_files(
-    task: str,
-    read: Callable[[Mapping[str, str]], object] | None = None,
-    *,
-    has_case: bool = False,
-) -> Endpoint:
+def _with_files(task: str, *names: str) -> Endpoint:
     """Return an endpoint that sends the reports of a slow task on the files of a form.
 
-    The arguments of the task are the paths of copies of the files, what `read`, if any, returns of
-    the other fields of the form, and the values of its case if it has one.
+    The arguments of the task are the paths of copies of the files, and the values of the named
+    fields of the form.
     """
 
     async def answer(request: Request) -> Response:
-        limits = {"max_files": MAX_FILES, "max_fields": MAX_FIELDS, "max_part_size": MAX_CASE}
         async with AsyncExitStack() as stack:
             folder = stack.enter_context(TemporaryDirectory())
-            async with request.form(**limits) as form:
+            async with request.form() as form:
                 files = [value for value in form.getlist("file") if not isinstance(value, str)]
-                fields = {name: text for name, text in form.items() if isinstance(text, str)}
-                case = fields.pop("case", "")
-                arguments: list[object] = []
-                if read:
-                    arguments.append(read({name: text for name, text in fields.items() if text}))
-                if has_case:
-                    arguments.append(_groups(request, case))
+                values = [
+                    {"table": _table, "case": _case}[name](request, str(form.get(name, "{}")))
+                    for name in names
+                ]
                 if not files:
                     raise HTTPException(400, "the request contains no form with a file")
                 paths = await anyio.to_thread.run_sync(_copy, files, folder)
-            reports = request.app.state.slow.run(task, paths, *arguments)
+            reports = request.app.state.slow.run(task, paths, *values)
             return _Reports(reports, stack.pop_all())
 
     return answer
@@ -239,28 +219,6 @@ def _copy(files: Sequence[UploadFile], folder: str) -> list[str]:
             shutil.copyfileobj(file.file, target)
         paths.append(str(path))
     return paths
-
-
-async def _last_report(request: Request, reports: Reports) -> dict[str, Any]:
-    """Return the last report of a task; end the task if the page disconnects."""
-    report: dict[str, Any] = {}
-
-    async def cancel_on_disconnect() -> None:
-        while (await request.receive())["type"] != "http.disconnect":
-            pass
-        group.cancel_scope.cancel()
-
-    async with anyio.create_task_group() as group, aclosing(reports):
-        group.start_soon(cancel_on_disconnect)
-        async for report in reports:  # noqa: B007 - the last report is used
-            pass
-        group.cancel_scope.cancel()
-    # Nobody reads the answer to a page that has disconnected.
-    return report if report.keys() & {"answer", "error"} else {"error": ""}
-
-
-def _json(report: dict[str, Any]) -> Response:
-    return JSONResponse(report, 400 if "error" in report else 200)
 
 
 def _guarded(endpoint: Endpoint, max_length: int = 0) -> Endpoint:
@@ -289,7 +247,7 @@ def _guarded(endpoint: Endpoint, max_length: int = 0) -> Endpoint:
 async def _report_error(request: Request, error: Exception) -> Response:  # noqa: ARG001 - an error handler
     if isinstance(error, HTTPException):
         return JSONResponse({"error": error.detail, "field": None}, error.status_code)
-    return _json(describe_error(error))
+    return JSONResponse(describe_error(error), 400)
 
 
 class _Reports(StreamingResponse):
@@ -306,34 +264,24 @@ class _Reports(StreamingResponse):
             await super().__call__(scope, receive, send)
 
 
-class _WithHeaders:
-    """Application whose responses have `HEADERS`, and are kept only with an entity tag."""
-
-    def __init__(self, app: ASGIApp) -> None:
-        self._app = app
-
-    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        async def send_with_headers(message: Message) -> None:
-            if message["type"] == "http.response.start":
-                headers = MutableHeaders(scope=message)
-                headers["Cache-Control"] = "no-cache" if "etag" in headers else "no-store"
-                for name, value in HEADERS.items():
-                    headers.setdefault(name, value)
-            await send(message)
-
-        await self._app(scope, receive, send_with_headers)
-
-
-def _groups(request: Request, content: bytes | str) -> dict[str, dict[str, Any]]:
-    """Return the values of JSON, by group and key: each value is plain, or a list of plain ones.
-
-    Raise InputError if they name a file that the server does not offer itself.
-    """
+def _table(_: Request, content: bytes | str) -> dict[str, Any]:
+    """Return a JSON object."""
     try:
         values = json.loads(content)
     except (UnicodeDecodeError, ValueError, RecursionError):
         values = None
-    if not (isinstance(values, dict) and all(map(_is_group, values.values()))):
+    if not isinstance(values, dict):
+        raise HTTPException(400, "the request does not contain a table of plain values")
+    return values
+
+
+def _case(request: Request, content: bytes | str) -> dict[str, dict[str, Any]]:
+    """Return the values of a case, by group and key: each value is plain, or a list of plain ones.
+
+    Raise InputError if they name a file that the server does not offer itself.
+    """
+    values = _table(request, content)
+    if not all(map(_is_group, values.values())):
         raise HTTPException(400, "the request does not contain groups of keys with plain values")
     for group, name in FILE_KEYS:
         path = values.get(group, {}).get(name)
@@ -370,6 +318,7 @@ def run_server(application: Starlette, listener: socket.socket) -> None:
         application,
         http="h11",
         log_level="warning",
+        headers=HEADERS,
         limit_concurrency=MAX_REQUESTS,
         timeout_keep_alive=IDLE_TIME,
         h11_max_incomplete_event_size=MAX_HEAD,

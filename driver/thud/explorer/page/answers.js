@@ -2,7 +2,7 @@
 import { byId, button, element } from "thud/page.js";
 import { ConnectionError, ServerError, ask, follow } from "thud/request.js";
 import { about, caseValues, isTyping, markField, state } from "thud/form.js";
-import { isLaboratory, recording, recordingBody, recordingRequest } from "thud/recording.js";
+import { isLaboratory, recording, recordingBody, statedTable } from "thud/recording.js";
 
 // Pause before a slow case is requested, and before outdated results are dimmed, ms.
 export const PAUSE = 120;
@@ -39,7 +39,7 @@ function idOf(file) {
 export const subjectOf = (door) => JSON.stringify(door === "recording" ? recording.files.map(idOf) : caseValues(door));
 
 /** Return the text of the request of a door with its present values and files. */
-export const requestOf = (door) => JSON.stringify([subjectOf(door), door === "recording" && recordingRequest().values]);
+export const requestOf = (door) => JSON.stringify([subjectOf(door), door === "recording" && statedTable()]);
 
 /** Return whether the answer of a door is that to its present values and files. */
 export function isCurrent(door) {
@@ -205,11 +205,10 @@ async function compute(thisJob, door) {
 
 async function assess(thisJob) {
   const [{ name }, ...others] = recording.files.filter((file) => !isLaboratory(file));
-  const { values } = recordingRequest();
   const title = `Assessing ${recording.files.map((file) => file.name).join(", ")}`;
   const answer = await runTask(title, "measure", recordingBody(), thisJob.controller, { showNow: true });
   const drops = `${answer.drops} drop${answer.drops === 1 ? "" : "s"}`;
-  const asks = answer.asks.filter((ask) => Object.keys(ask.values).some((key) => !(key in values)));
+  const asks = answer.asks.filter((ask) => Object.keys(ask.values).some((key) => !(key in state.recording)));
   return { name: `${others.length ? `${name} and ${others.length} more` : name}, ${drops}`, answer: { ...answer, asks } };
 }
 

@@ -89,7 +89,7 @@ async function download(name, copyButton) {
   try {
     const file = await fileOf(name, values);
     if (!copyButton) saveFile(name, file);
-    else if (await copyText(await file.text(), copyButton.textContent)) flash(copyButton, "Copied");
+    else if (await copyText(file, copyButton.textContent)) flash(copyButton, "Copied");
     hideMessage();
   } catch (error) { showError(error); }
 }

@@ -1,7 +1,7 @@
 // Files and texts to send: plots, and the case as text.
 import { button, byId, element, saveFile, svgElement } from "thud/page.js";
 import { contentOf, imageOf } from "thud/plot.js";
-import { ask } from "thud/request.js";
+import { follow } from "thud/request.js";
 
 // Size of a saved plot, px.
 const SIZE = [720, 420];
@@ -75,7 +75,5 @@ export async function copyText(text, title) {
   }
 }
 
-/** Return a file that the server makes of values. */
-export async function fileOf(name, values) {
-  return (await ask(`download/${name}`, { method: "POST", body: JSON.stringify(values) })).blob();
-}
+/** Return the content of a file that the server makes of values. */
+export const fileOf = (name, values) => follow(`download/${name}`, JSON.stringify(values));

@@ -1,7 +1,7 @@
 // Sound in the room below: a button for each variant with a room, and a player.
 import { button, byId } from "thud/page.js";
 import { swatch } from "thud/plot.js";
-import { ask } from "thud/request.js";
+import { fileOf } from "thud/files.js";
 
 const NOTE = "Computed, not recorded: no measured room, no furniture, no listener's head; 50 to 630 Hz. The levels of all variants have the same scale: set the volume for the loudest.";
 // Address and full scale, Pa, of each downloaded sound by the text of its case.
@@ -50,7 +50,7 @@ async function playSound(variant, rooms) {
 async function loadSound(variant) {
   const text = caseOf(variant);
   if (sounds.has(text)) return;
-  const response = await ask("download/room.wav", { method: "POST", body: text });
-  const fullScale = Number(response.headers.get("X-Thud-Full-Scale"));
-  sounds.set(text, { address: URL.createObjectURL(await response.blob()), fullScale });
+  const { wav, full_scale: fullScale } = await fileOf("room.wav", variant.values);
+  const content = Uint8Array.from(atob(wav), (letter) => letter.charCodeAt(0));
+  sounds.set(text, { address: URL.createObjectURL(new Blob([content], { type: "audio/wav" })), fullScale });
 }

@@ -1,5 +1,7 @@
 // The door of a recording: its files, what they do not say, and what its answer asks for.
-import { button, byId, element, fieldRow, fileZone, numberOf, numberProblem, select } from "thud/page.js";
+import {
+  button, byId, element, fieldRow, fileZone, numberOf, numberProblem, scaled, select,
+} from "thud/page.js";
 import { about, buildInputs, listenToTyping, state } from "thud/form.js";
 import { ServerError } from "thud/request.js";
 
@@ -11,14 +13,18 @@ export const recording = { files: [] };
 /** What the answer asks for, between the files and the other fields. */
 const asked = element("div", { id: "asks", role: "group", "aria-label": "Missing values", hidden: true });
 
-/** Return what is stated, numbers as the server reads them, and the files. */
-export function recordingRequest() {
-  const values = { ...state.recording };
-  for (const { name, kind } of about.recording) {
-    const number = kind === "number" && name in values ? numberOf(values[name]) : NaN;
-    if (!Number.isNaN(number)) values[name] = String(number);
+const statedFields = () => about.recording.filter(({ name }) => name in state.recording);
+
+/** Return what is stated as a table of the configuration of a recording; NaN for no number. */
+export function statedTable() {
+  const table = {};
+  for (const { name, path, kind, unit } of statedFields()) {
+    const text = state.recording[name];
+    const value = kind === "number" ? scaled(numberOf(text), unit === "%" ? -2 : 0) : text;
+    if (path.length > 1) (table[path[0]] ??= {})[path[1]] = value;
+    else table[name] = value;
   }
-  return { values, files: recording.files };
+  return table;
 }
 
 /** Take over the text of a field, and show it in its other inputs. */
@@ -120,17 +126,17 @@ function recordingField(field, { onChange, onTyping }) {
 
 /** Return the body of a request; throw ServerError for one that the server would refuse. */
 export function recordingBody(values) {
-  const { values: stated, files } = recordingRequest();
   const body = new FormData();
+  body.set("table", JSON.stringify(statedTable()));
   if (values) body.set("case", JSON.stringify(values));
   const refuse = (error, field) => { throw new ServerError({ error, field }); };
-  for (const { name, label, kind } of about.recording.filter((field) => field.name in stated)) {
-    if (kind === "number" && Number.isNaN(numberOf(stated[name])))
-      refuse(`${label}: ${numberProblem(stated[name])}`, name);
-    body.set(name, stated[name]);
+  for (const { name, label, kind } of statedFields()) {
+    const text = state.recording[name];
+    if (kind === "number" && Number.isNaN(numberOf(text)))
+      refuse(`${label}: ${numberProblem(text)}`, name);
   }
   const limit = about.max_recording;
-  for (const file of files) {
+  for (const file of recording.files) {
     if (file.size > limit) refuse(`${file.name} is larger than ${limit / 1e6} MB; allowed: less`);
     body.append("file", file);
   }

@@ -56,10 +56,8 @@ export async function ask(path, options = {}) {
 }
 
 /** Return the answer at the end of a stream of reports; `onProgress` gets the fraction done. */
-export async function follow(path, body, signal, onProgress) {
+export async function follow(path, body, signal = null, onProgress = () => {}) {
   const response = await ask(path, { method: "POST", body, signal });
-  // A quick answer comes as a whole, not as a stream.
-  if (response.headers.get("Content-Type").startsWith("application/json")) return (await response.json()).answer;
   const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
   let rest = "";
   for (;;) {
