@@ -34,11 +34,10 @@ function svgText(host) {
 }
 
 /** Return a plot as comma-separated values; no text of it is a formula of a spreadsheet. */
-function csvText({ rows, curves, limits, x, y }) {
+function csvText({ curves, limits, x, y }) {
   const quoted = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
   const plain = (value) => (typeof value === "string" ? value.replace(/^[=+\-@]/, "'$&") : String(value ?? ""));
   const lines = (table) => `${table.map((row) => row.map((value) => quoted(plain(value))).join(",")).join("\n")}\n`;
-  if (rows) return lines([["contribution", `${x.title}, ${x.unit}`], ...rows]);
   const columns = curves.map((curve) => `${curve.name}, ${y.unit}`);
   if (x.bands) {
     const table = curves.flatMap(({ y: values, ends = [] }, k) => [[columns[k], ...values],

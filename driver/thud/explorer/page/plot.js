@@ -1,4 +1,4 @@
-// Plots of curves against numbers or bands, with limits, and bars.
+// Plots of curves against numbers or bands, with limits.
 import { element, minus, rounded, setUp, svgElement } from "thud/page.js";
 
 const MARKS = [
@@ -17,11 +17,10 @@ const watcher = new ResizeObserver((entries) => entries.forEach((entry) => redra
 
 /** Draw a plot in an element.
  *
- * `content` has a title and either `rows` of bars, [title, value], or `curves`. These have name,
- * style, x, y and the options `marks`, `thin` and `ends` ([low, high] of each value). The axes `x`
- * and `y` have a title and a unit; `x.bands` is a list of names of bands. `limits` are [lower,
- * upper] of each band, and `results` are those of the first curve. With `hasCursor` the first
- * curve has the cursor of `setCursor`.
+ * `content` has a title and `curves` with name, style, x, y and the options `marks`, `thin` and
+ * `ends` ([low, high] of each value). The axes `x` and `y` have a title and a unit; `x.bands` is a
+ * list of names of bands. `limits` are [lower, upper] of each band, and `results` are those of the
+ * first curve. With `hasCursor` the first curve has the cursor of `setCursor`.
  */
 export function plot(host, content) {
   const entry = drawn.get(host) ?? {};
@@ -41,7 +40,7 @@ export function setCursor(host, at) {
   if (!entry) return;
   entry.at = at;
   const { content, drawing } = entry;
-  if (!drawing?.moment || !content.hasCursor) return;
+  if (!drawing || !content.hasCursor) return;
   const [{ x, y }] = content.curves;
   const isInside = at !== null && at >= x[0] && at <= x.at(-1);
   setUp(drawing.moment, { visibility: isInside ? "visible" : "hidden" });
@@ -66,8 +65,8 @@ export function swatch(style, hasMarks = false) {
 
 /** Return the image of a content with a legend of several curves, for files. */
 export function imageOf(content, width, height) {
-  const { image } = draw(content, width, height);
-  const { curves = [] } = content;
+  const { image } = drawCurves(content, width, height);
+  const { curves } = content;
   if (curves.length < 2) return image;
   setUp(image, { height: height + LINE * curves.length + 6 });
   for (const [i, { name, style }] of curves.entries()) {
@@ -82,22 +81,12 @@ function redraw(host) {
   const entry = drawn.get(host);
   const [width, height] = [host.clientWidth, host.clientHeight];
   if (!entry?.content || !width || !height) return;
-  entry.drawing = draw(entry.content, width, height);
+  entry.drawing = drawCurves(entry.content, width, height);
   const { image } = entry.drawing;
   const readout = element("div", { class: "readout", hidden: true });
-  if (!entry.content.rows) showValuesAtPointer(entry, image, readout);
+  showValuesAtPointer(entry, image, readout);
   host.replaceChildren(image, readout);
   if (entry.at !== undefined) setCursor(host, entry.at);
-}
-
-function draw(content, width, height) {
-  return content.rows ? drawBars(content, width, height) : drawCurves(content, width, height);
-}
-
-/** Return an empty image with a description. */
-function newImage(width, height, description) {
-  const viewBox = `0 0 ${width} ${height}`;
-  return svgElement("svg", { width, height, viewBox, role: "img", "aria-label": description });
 }
 
 /** Return a text that begins, has its middle or ends at a position. */
@@ -117,7 +106,9 @@ function drawCurves(content, width, height) {
   const box = { left, right: width - 10, top: 24, bottom: height - 36 };
   const toX = (value) => left + ((value - across[0]) / (across[1] - across[0])) * (box.right - left);
   const toY = (value) => box.bottom - ((value - up[0]) / (up[1] - up[0])) * (box.bottom - box.top);
-  const image = newImage(width, height, describeCurves(content));
+  const viewBox = `0 0 ${width} ${height}`;
+  const description = describeCurves(content);
+  const image = svgElement("svg", { width, height, viewBox, role: "img", "aria-label": description });
   image.append(...limits.map(([lower, upper], i) => svgElement("rect", {
     class: `limits ${results[i] ?? ""}`, x: toX(i - 0.38), width: toX(0.76) - toX(0), y: toY(upper),
     height: toY(lower) - toY(upper),
@@ -159,32 +150,6 @@ function curveElement(curve, toX, toY) {
   }
   if (curve.marks) group.append(...points.map(([x, y]) => MARKS[curve.style % MARKS.length](x, y)));
   return group;
-}
-
-function drawBars(content, width, height) {
-  const { rows } = content;
-  const [low, high] = padded(rangeOf([rows.map(([, value]) => value), [0]]));
-  const isWide = width > 480;
-  const left = isWide ? 14 + LETTER * Math.max(...rows.map(([title]) => title.length)) : 14;
-  const toX = (value) => left + ((value - low) / (high - low)) * (width - 50 - left);
-  const room = (height - 44) / rows.length;
-  const image = newImage(width, height, `${content.title}, ${content.x.unit}. ${rows.map(
-    ([title, value]) => `${title} ${value.toFixed(1)}`).join("; ")}`);
-  for (const value of ticks([low, high], (width - left) / 60)) {
-    image.append(line(value === 0 ? "axis" : "grid", toX(value), toX(value), 4, height - 36));
-    image.append(quiet(toX(value), height - 20, minus(value), "middle"));
-  }
-  for (const [i, [title, value]] of rows.entries()) {
-    const top = 6 + room * i + (isWide ? room * 0.2 : 15);
-    const size = isWide ? Math.min(room * 0.6, 20) : Math.max(4, Math.min(room - 20, 12));
-    const middle = top + size / 2 + 4;
-    const bar = { x: toX(0), width: Math.max(1.5, toX(value) - toX(0)), y: top, height: size };
-    image.append(isWide ? text(left - 8, middle, title, "end") : text(2, top - 4, title));
-    image.append(svgElement("rect", { class: "range", ...bar }));
-    image.append(quiet(toX(value) + 5, middle, value.toFixed(1)));
-  }
-  image.append(quiet(width - 10, height - 4, titleOf(content.x), "end"));
-  return { image };
 }
 
 /** Show the values of all curves at the pointer. */

@@ -96,10 +96,8 @@ function showRooms(variants) {
     x: { title: "One-third-octave band", unit: "Hz", bands: bands.map(String) },
     y: { title: "Maximum Fast level", unit: "dB", reference: " re 20 µPa" },
   });
-  plot(byId("contributions"), {
-    title: "Contributions to the standard uncertainty",
-    x: { title: "Standard uncertainty", unit: "dB" }, rows: contributions.filter(([, value]) => value >= 0.05),
-  });
+  fillTable("contributions", ["Contribution", "Standard uncertainty, dB"], contributions
+    .filter(([, value]) => value >= 0.05).map(([title, value]) => [title, value.toFixed(1)]));
 }
 
 /** Return the swatch and the name of a variant; a text if there is only one variant. */
