@@ -6,7 +6,7 @@ import { showAnswer, showFloors, showWarnings } from "thud/results.js";
 import { showBall } from "thud/ball.js";
 import { showRatings, showSection } from "thud/section.js";
 import { caseValues, isTyping, state, takeValues } from "thud/form.js";
-import { buildDoor, keepStated, recording, recordingBody, showAsks } from "thud/recording.js";
+import { buildDoor, recording, recordingBody, showAsks } from "thud/recording.js";
 import { freeStyle, nameVariants, showVariants } from "thud/variants.js";
 import { showSounds } from "thud/listen.js";
 import { PAUSE, cancel, computeSoon, current, hideMessage, isCurrent, kept, listenToAnswers, onInvalid, onTyping, once, requestOf, runTask, runningJob, showError, showMessage, showStatus, solve, subjectOf, titleOfDoor } from "thud/answers.js";
@@ -125,7 +125,6 @@ function removeVariant(variant) {
   else {
     recording.files = [];
     current.recording = null;
-    keepStated();
   }
   showAll();
   byId("keep").focus();

@@ -69,7 +69,7 @@ function reset() {
 
 /** Begin with the values of a case, or with the first preset. */
 function begin(start) {
-  Object.assign(state, { values: {}, unknowns: {}, recording: {}, earlier: [], titles: {}, model: "" });
+  Object.assign(state, { values: {}, unknowns: {}, recording: {}, titles: {}, model: "" });
   const floors = about.presets.find((preset) => preset.door === "floor");
   takeValues(floors.values);
   if (Object.keys(start).length) takeValues(start);

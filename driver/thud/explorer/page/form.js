@@ -7,10 +7,10 @@ import { pressInputs } from "thud/press.js";
 /** What the server says of itself. */
 export const about = {};
 /** The case: values that differ from their defaults, the chosen construction, what is not known, by
- * model, fields of the recording and those of an earlier one, names of the user, and the view. */
+ * model, fields of the recording, names of the user, and the view. */
 export const state = {
   door: "ball", model: "", floor: "plate", chosen: "", room: true, values: {}, unknowns: {},
-  recording: {}, earlier: [], titles: {}, view: { thirds: false },
+  recording: {}, titles: {}, view: { thirds: false },
 };
 
 // Digits of a number in its field.

@@ -31,17 +31,10 @@ export function statedTable() {
 function setStated(name, text, source) {
   if (text.trim()) state.recording[name] = text;
   else delete state.recording[name];
-  state.earlier = state.earlier.filter((other) => other !== name);
   for (const id of [`recording_${name}`, `ask_${name}`]) {
     const input = byId(id);
     if (input && input !== source) input.value = text;
   }
-  showEarlier();
-}
-
-/** Say that what is stated belongs to an earlier recording, whose files are gone. */
-export function keepStated() {
-  state.earlier = Object.keys(state.recording);
 }
 
 /** Build the form of the recording; its handlers are those of `buildInputs`. */
@@ -55,29 +48,11 @@ function buildRecording(handlers) {
       FILES_HELP, (files) => addFiles(files, onChange)),
     element("ul", { id: "files", "aria-label": "Files" }), asked,
     element("fieldset", {}, element("legend", {}, "What the file does not say"),
-      element("p", { id: "earlier", class: "help" }), ...fields(false)),
-    element("details", { class: "folded" },
+      ...fields(false)),
+    // Values that are kept of an earlier recording are in sight.
+    element("details", { class: "folded", open: statedFields().some(({ folded }) => folded) },
       element("summary", {}, "Uncertainties, filter, report"), ...fields(true)));
   showFiles(onChange);
-  showEarlier(handlers);
-}
-
-let clearEarlier = null;
-
-/** Show which values were stated for an earlier recording, and a button to clear them. */
-function showEarlier(handlers) {
-  if (handlers) clearEarlier = () => {
-    for (const name of state.earlier) delete state.recording[name];
-    state.earlier = [];
-    buildRecording(handlers);
-    byId("recording_height").focus();
-    handlers.onChange();
-  };
-  const labels = about.recording.filter(({ name }) => state.earlier.includes(name))
-    .map(({ label, name }) => `${label}: ${state.recording[name]}`);
-  byId("earlier").hidden = !labels.length;
-  byId("earlier").replaceChildren(`Kept from the last recording: ${labels.join("; ")}. `,
-    button("Clear", clearEarlier, { id: "clear_earlier" }));
 }
 
 export function addFiles(files, onChange) {
@@ -93,8 +68,6 @@ function showFiles(onChange) {
   byId("files")?.replaceChildren(...recording.files.map((file) => element("li", {},
     isLaboratory(file) ? `${file.name} (laboratory)` : file.name, button("×", () => {
       recording.files = recording.files.filter((other) => other !== file);
-      if (!recording.files.length) keepStated();
-      showEarlier();
       showFiles(onChange);
       byId("file").focus();
       onChange();

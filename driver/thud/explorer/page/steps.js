@@ -2,7 +2,7 @@
 import { byId } from "thud/page.js";
 import { storeCase, storedCase } from "thud/storage.js";
 import { about, state } from "thud/form.js";
-import { keepStated, recording } from "thud/recording.js";
+import { recording } from "thud/recording.js";
 import { current, isCurrent, kept } from "thud/answers.js";
 
 // Pause after a change before it can be undone, ms.
@@ -29,7 +29,7 @@ export function commit() {
 }
 
 function sameCase(one, other) {
-  const text = (entry) => JSON.stringify({ ...JSON.parse(entry), door: null, earlier: null, view: null });
+  const text = (entry) => JSON.stringify({ ...JSON.parse(entry), door: null, view: null });
   return text(one) === text(other);
 }
 
@@ -76,7 +76,5 @@ export function restoreStored() {
   if (entry?.start !== JSON.stringify(about.start) || !about.models.some(({ name }) => name === entry.state?.model)) return false;
   restore(entry.state);
   kept.list = entry.kept;
-  // The files are not stored.
-  keepStated();
   return true;
 }
