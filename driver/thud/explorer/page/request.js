@@ -15,14 +15,12 @@ export class ConnectionError extends Error {}
 const MISSING_TOKEN = "Open the full address shown in the terminal: it holds the token";
 const restart = () => `start it again with: thud-driver explore --port ${location.port}`;
 
-let tokenInAddress = "";
-
 /** Return the parameters of the address; the token moves to the storage of the browser. */
 export function takeFragment() {
   const parameters = new URLSearchParams(location.hash.slice(1));
   const token = parameters.get("token");
   if (token) {
-    tokenInAddress = storeText("token", token) ? "" : `token=${token}`;
+    storeText("token", token);
     parameters.delete("token");
     setFragment(String(parameters));
   }
@@ -31,8 +29,7 @@ export function takeFragment() {
 
 /** Set the parameters of the address. */
 export function setFragment(text) {
-  const all = [text, tokenInAddress].filter(Boolean).join("&");
-  history.replaceState(null, "", all ? `#${all}` : location.pathname);
+  history.replaceState(null, "", text ? `#${text}` : location.pathname);
 }
 
 /** Parameters with which the page was opened. */
