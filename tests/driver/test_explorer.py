@@ -684,10 +684,6 @@ def test_nested_values_get_a_sentence(
 
 # Tokens that are not that of the server: none, empty, parts of it, longer, of other letters.
 TOKENS = ["", "é", "guess", TOKEN[:1], TOKEN[:-1], TOKEN[1:], TOKEN + "x"]
-ORIGINS = [
-    "http://elsewhere.example", "null", "", "https://127.0.0.1", "http://127.0.0.1:1",
-    "http://127.0.0.1.rebound.example", "http://localhost", "http://127.0.0.1 ",
-]  # fmt: skip
 HOSTS = [
     "rebound.example", "rebound.example:80", "127.0.0.1.rebound.example", "rebound.127.0.0.1",
     "127.0.0.1@rebound.example", "localhost.rebound.example", "127.1", "2130706433", "",
@@ -707,9 +703,7 @@ def status_of(client: TestClient, method: str, address: str, headers: dict[str, 
     [
         ({}, 403),
         *(({server.TOKEN: token}, 403) for token in TOKENS),
-        *(({**HEAD, "Origin": origin}, 403) for origin in ORIGINS),
         *(({**HEAD, "Host": host}, 400) for host in HOSTS),
-        *(({**HEAD, "Origin": f"http://{host}", "Host": host}, 400) for host in HOSTS),
     ],
 )
 def test_every_route_refuses_strangers(
@@ -723,7 +717,10 @@ def test_every_route_refuses_strangers(
     for path in routes.keys() - {"/"}:
         for method in routes[path]:
             assert status_of(client, method, path, headers) == expected, (method, path)
-    assert status_of(client, "GET", "/about", {**HEAD, "Origin": "http://127.0.0.1"}) == 200
+    # A browser asks before it sends a token to another page than its own.
+    asking = {"Origin": "http://elsewhere.example", "Access-Control-Request-Method": "POST"}
+    answer = client.options("/solve", headers=asking)
+    assert not any(name.startswith("access-control") for name in answer.headers)
 
 
 def test_page_holds_no_token(client: TestClient) -> None:

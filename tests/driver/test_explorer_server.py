@@ -135,7 +135,9 @@ def test_version_6_of_this_machine_is_served() -> None:
         with closing(HTTPConnection(host.strip("[]"), port, timeout=60)) as connection:
             # As a page that has found the address by another name.
             connection.request("GET", "/", headers={"Host": "rebound.example"})
-            assert connection.getresponse().status == 400
+            response = connection.getresponse()
+            assert response.status == 400
+            assert response.headers["X-Content-Type-Options"] == "nosniff"
 
 
 def test_body_of_an_answer_does_not_wait_for_an_acknowledgment(
