@@ -14,25 +14,28 @@ from thud.base.checks import refuse
 from thud.base.errors import ThudError
 from thud.base.units import size_of
 from thud.case.case import Case, new_model
-from thud.case.keys import with_values
+from thud.case.keys import find_key, with_values
 from thud.explorer.answer import new_case
-from thud.explorer.form import field_of, lower, shown
 from thud.explorer.models import MODEL_FACTS, facts_of
 from thud.explorer.recording import read_copies
+from thud.explorer.series import to_json
 from thud.recordings.table import read_table
 from thud.studies.compression_fit import fit_compression
 from thud.studies.fit import fit
 from thud.studies.fitting.force_target import ForceTarget
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Mapping, Sequence
 
     from thud.recordings.table import Table
     from thud.studies.compression_fit import CompressionFit
     from thud.studies.fitting.fit_result import Fit
 
     Values = dict[str, dict[str, Any]]
+    Answer = dict[str, Any]
 
+# Warnings that the model does not explain the data.
+NOT_NOISE = {"unexplained", "residuals_colored"}
 # Maximum number of points of a curve; of more, every second, third and so on is used.
 MAX_POINTS = 2000
 EXPECTED = (
@@ -41,21 +44,15 @@ EXPECTED = (
 )
 
 
-def fit_recording(
-    paths: Sequence[str], table: Mapping[str, object], values: Values
-) -> dict[str, Any]:
-    """Fit parameters of a model to the first drop of a recording.
-
-    The answer has the values of the case with the fitted ones and what the recording states, a text
-    with their intervals, and details of the fit.
-    """
+def fit_recording(paths: Sequence[str], table: Mapping[str, object], values: Values) -> Answer:
+    """Fit parameters of a model to the first drop of a recording; see `_answer`."""
     recording = read_copies(paths, table)
     stated = {"height": recording.config.height, "mass": recording.config.mass}
     known = {key: value for key, value in stated.items() if value is not None}
     case = with_values(new_case(values), known)
     parameters = facts_of(case).fitted
     if not parameters:
-        able = ", ".join(name for name, facts in MODEL_FACTS.items() if facts.fitted)
+        able = ", ".join(facts.title for facts in MODEL_FACTS.values() if facts.fitted)
         refuse("the model has no parameters that a recording determines", able)
     restitution = recording.restitution
     if not math.isnan(restitution) and not 0 < restitution <= 1:
@@ -64,36 +61,47 @@ def fit_recording(
             f"the restitution of the recording is {number}: no ball can be fitted to it",
             "0 to 1; check mass, drop height, calibration, drops and polarity",
         )
-    # Warnings are part of the text.
+    # Warnings are part of the answer.
     with warnings.catch_warnings(action="ignore"):
         result = fit(ForceTarget(recording), parameters, case)
-    for name, value in known.items():
-        field = field_of(case, name)
-        values.setdefault(field["group"], {})[field["name"]] = value
-    fitted = f"Fitted to {Path(paths[0]).name}: {_fitted(case, values, result, parameters)}"
-    trust = "The verdict is that of the best values, not of their intervals."
+    best = known | {name: result.values[name] for name in parameters}
+    name = Path(paths[0]).name
+    return {"file": name} | _answer(values, case, best, result, result.targets[0].columns())
+
+
+def _answer(
+    values: Values,
+    case: Case,
+    best: Mapping[str, Any],
+    result: Fit | CompressionFit,
+    columns: Mapping[str, Any],
+) -> Answer:
+    """Return the values of a case with those of a fit, and what is known of its quality.
+
+    These are the intervals (95 %) of the fitted parameters, None where they are not
+    determined, the largest residual, N and as a fraction of the largest force, whether the
+    residuals are noise, and warnings and assumptions.
+    """
+    keys = {name: find_key(name, case)[0] for name in best}
+    for name, key in keys.items():
+        values.setdefault(key.group, {})[key.name] = best[name]
+    residual = float(np.abs(columns["residual_N"]).max())
+    measured = columns["target_N" if "target_N" in columns else "force_N"]
     return {
         "values": values,
-        "text": f"{fitted}{_misfit_text(result)} {trust}",
-        "details": _sentences(result.warnings),
+        "intervals": [
+            [f"{keys[name].group}.{name}", *to_json(ends)]
+            for name, ends in result.intervals().items()
+            if name in keys
+        ],
+        "residual": [residual, residual / float(np.max(measured))],
+        "is_explained": NOT_NOISE.isdisjoint(note.code for note in result.warnings),
+        "notes": [str(note) for note in (*result.warnings, *result.assumptions)],
     }
 
 
-def _misfit_text(result: Fit) -> str:
-    """Return the end of a sentence on a fit: the largest residual, if it is more than the noise."""
-    unexplained = next((note for note in result.warnings if note.code == "unexplained"), None)
-    if unexplained is None:
-        return "."
-    columns = {name: np.asarray(values) for name, values in result.targets[0].columns().items()}
-    residual = np.abs(columns["residual_N"]).max()
-    return (
-        f", but {unexplained}; the largest residual is {residual:.0f} N, "
-        f"{100 * residual / columns['target_N'].max():.2g} % of the peak."
-    )
-
-
-def fit_press(paths: Sequence[str], values: Values) -> dict[str, Any]:
-    """Fit the modulus of a ball to the curve of a press; see `fit_recording`.
+def fit_press(paths: Sequence[str], values: Values) -> Answer:
+    """Fit the modulus of a ball to the loading branch of the curve of a press; see `_answer`.
 
     Raise InputError if the file is no curve, or the model has no modulus.
     """
@@ -109,37 +117,17 @@ def fit_press(paths: Sequence[str], values: Values) -> dict[str, Any]:
     name = Path(paths[0]).name
     table = read_table(name, EXPECTED)
     deflection, force = (_column(table, unit) for unit in ("m", "N"))
-    # The loading branch, thinned out.
     count = int(np.argmax(deflection)) + 1
     used = slice(0, count, -(-count // MAX_POINTS))
-    rest = len(deflection) - count
-    left_out = [f"the {rest} points after the largest deflection are left out"] if rest else []
     try:
-        # Warnings are part of the details.
+        # Warnings are part of the answer.
         with warnings.catch_warnings(action="ignore"):
             model = new_model(case.model, {})
             result = fit_compression(deflection[used], force[used], case.ball, model)
     except ThudError as error:
         raise error.within(name) from error
-    residual = float(np.sqrt(np.mean(result.residuals**2)))
-    radius, wall = (
-        shown(field_of(case, key), getattr(case.ball, key))
-        for key in ("outer_radius", "wall_thickness")
-    )
-    details = [
-        *result.warnings, *left_out,
-        f"a curve determines the modulus only: radius {radius} and wall {wall} are as stated",
-        "a press measures slowly: in an impact rubber is stiffer", *map(str, result.assumptions),
-    ]  # fmt: skip
-    return {
-        "values": values,
-        "name": Path(name).stem,
-        "text": f"Fitted to {name}: {_fitted(case, values, result, ['youngs_modulus'])}. The curve "
-        f"differs from the model by {residual:.2g} N (RMS), "
-        f"{100 * residual / float(force.max()):.2g} % of the largest force: "
-        f"{'see the warnings' if result.warnings else 'the model explains the curve'}.",
-        "details": _sentences(details),
-    }
+    best = {"youngs_modulus": result.values["youngs_modulus"]}
+    return {"file": name} | _answer(values, case, best, result, result.columns())
 
 
 def _column(table: Table, unit: str) -> np.ndarray[Any, np.dtype[np.float64]]:
@@ -152,19 +140,3 @@ def _column(table: Table, unit: str) -> np.ndarray[Any, np.dtype[np.float64]]:
     if not np.isfinite(values).all():
         refuse(f"{table.name}: {columns[0]}: a value is not finite", "finite numbers")
     return values
-
-
-def _fitted(case: Case, values: Values, result: Fit | CompressionFit, names: Sequence[str]) -> str:
-    """Take fitted values over into those of a case; return them in words, with intervals (95 %)."""
-    intervals, texts = result.intervals(), []
-    for name in names:
-        field, value = field_of(case, name), result.values[name]
-        values.setdefault(field["group"], {})[field["name"]] = value
-        best, low, high = (shown(field, x, unit=False) for x in (value, *intervals[name]))
-        ends = f"{low} to {high}" if np.isfinite(intervals[name]).all() else "not determined"
-        texts.append(f"{lower(field['label'])} {best} ({ends}) {field['unit']}".rstrip())
-    return f"{', '.join(texts)} (95 %)"
-
-
-def _sentences(texts: Iterable[object]) -> str:
-    return " ".join(f"{text[:1].upper()}{text[1:]}." for text in map(str, texts))

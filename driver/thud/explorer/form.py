@@ -10,14 +10,11 @@ from typing import TYPE_CHECKING, Any
 from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS, OPTIONAL_GROUPS, RATINGS, STANDARD_BALL
 from thud.base.units import display_unit, power_of, scaled
 from thud.case.constructions import constructions
-from thud.case.keys import find_key, humanize
+from thud.case.keys import humanize
 from thud.explorer.models import is_folded, users_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from thud.base.key import Group, Key
-    from thud.case.case import Case
 
 # A slider goes from the default divided by this factor to its multiple, or from 0, and ends before
 # a limit by a fraction of the distance.
@@ -57,24 +54,6 @@ def form() -> list[dict[str, Any]]:
 def fields_by_key() -> dict[tuple[str, str], dict[str, Any]]:
     """Return the fields of the page by group and key."""
     return {(field["group"], field["name"]): field for group in form() for field in group["fields"]}
-
-
-def field_of(case: Case, name: str) -> dict[str, Any]:
-    """Return the field of a key of a case."""
-    key, _ = find_key(name, case)
-    return fields_by_key()[key.group, key.name]
-
-
-def shown(field: Mapping[str, Any], value: float, digits: int = 4, *, unit: bool = True) -> str:
-    """Return a value of a key in the unit of its field: its digits, and the unit."""
-    number = f"{scaled(float(value), -field['power']):.{digits}g}"
-    return f"{number} {field['unit'] if unit else ''}".rstrip()
-
-
-def lower(label: str) -> str:
-    """Return a label for the middle of a sentence."""
-    is_name = label.startswith(("Young", "Poisson"))
-    return label if is_name else label[:1].lower() + label[1:]
 
 
 def construction_form() -> list[dict[str, Any]]:

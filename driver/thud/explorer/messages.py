@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from thud.base._schema import KEYS
 from thud.base.errors import InputError
+from thud.base.units import scaled
 from thud.case.keys import humanize
-from thud.explorer.form import fields_by_key, lower, shown
+from thud.explorer.form import fields_by_key
 from thud.explorer.recording_fields import FIELDS, PERCENT
 
 if TYPE_CHECKING:
@@ -64,6 +65,11 @@ def in_words(note: Note) -> str:
     return f"{others.get('place', '')}{name} {text}"
 
 
+def _shown(field: Field, value: float) -> str:
+    """Return a value of a key in the unit of its field."""
+    return f"{scaled(float(value), -field['power']):.10g} {field['unit']}".rstrip()
+
+
 def _out_of_range(note: Note, field: Field) -> str:
     """Return what is said of a value outside its range, in the unit of its field."""
     key = next(key for key in KEYS if (key.group, key.name) == (field["group"], field["name"]))
@@ -74,9 +80,9 @@ def _out_of_range(note: Note, field: Field) -> str:
     ):
         # A limit may be the value of another field.
         other = fields_by_key().get((field["group"], str(limit)))
-        label = f"{lower(other['label'])}, " if other else ""
+        label = f"{other['label'].lower()}, " if other else ""
         if abs(number) < _HUGE:
-            ends.append(f"{words[bool(is_open)]} {label}{shown(field, number, 10)}")
+            ends.append(f"{words[bool(is_open)]} {label}{_shown(field, number)}")
     whole = ", whole" if key.kind == "whole" or key.whole else ""
     allowed = f"{' and '.join(ends)}{whole}"
-    return f"= {shown(field, note.value, 10)} is not allowed; allowed: {allowed}"
+    return f"= {_shown(field, note.value)} is not allowed; allowed: {allowed}"

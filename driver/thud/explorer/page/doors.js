@@ -8,6 +8,7 @@ import { showRatings, showSection } from "thud/section.js";
 import { caseValues, isTyping, state, takeValues } from "thud/form.js";
 import { buildDoor, recording, recordingBody, showAsks } from "thud/recording.js";
 import { freeStyle, nameVariants, showVariants } from "thud/variants.js";
+import { CHANGE_NOTES, changeText, fitText, noChangeText, sentences } from "thud/texts.js";
 import { showSounds } from "thud/listen.js";
 import { PAUSE, cancel, computeSoon, current, hideMessage, isCurrent, kept, listenToAnswers, onInvalid, onTyping, once, requestOf, runTask, runningJob, showError, showMessage, showStatus, solve, subjectOf, titleOfDoor } from "thud/answers.js";
 import { commit, commitSoon, takeStep } from "thud/steps.js";
@@ -15,7 +16,7 @@ import { commit, commitSoon, takeStep } from "thud/steps.js";
 const RECORDING_TEXT = "Choose the record of one drop or more. The answer is the verdict with its uncertainty, the levels within the limits of the standards, and a calibration report to save. Missing values can be stated afterwards: the page asks for those that matter.";
 export const DOORS = ["recording", "ball", "floor"];
 // Text on the last fit, and the values that it belongs to.
-let fitted = { text: "", details: "", values: "" };
+let fitted = { answer: null, values: "" };
 // The variants on the page.
 let shown = [];
 
@@ -89,8 +90,10 @@ function toAsks(asks) {
 
 /** Show the result of the last fit, and its details folded; at first in sight. */
 function showFitTexts() {
-  const { text, details, isNew } = fitted;
-  byId("result").append(element("p", {}, text), ...(details ? [element("details", {}, element("summary", {}, "How well it fits"), element("p", { class: "help" }, details))] : []));
+  const { answer, isNew } = fitted;
+  const notes = element("p", { class: "help" }, sentences(answer.notes));
+  byId("result").append(element("p", {}, fitText(answer)), ...(answer.notes.length
+    ? [element("details", {}, element("summary", {}, "How well it fits"), notes)] : []));
   if (isNew) byId("result").scrollIntoView({ block: "nearest" });
   fitted.isNew = false;
 }
@@ -192,7 +195,7 @@ listenToAnswers({
 // ---- Actions.
 
 /** Return the answer of a task that is shown at once. */
-const runAction = (...task) => runTask(...task, new AbortController(), { showNow: true });
+const runAction = (...task) => runTask(...task, new AbortController());
 
 /** Save the calibration report of the recording. */
 const saveReport = once(async () => {
@@ -205,11 +208,11 @@ const fit = () => fitTo("Fitting a ball to the recording", "fit", () => recordin
 function onPress(body, name) {
   hideMessage();
   body.set("case", JSON.stringify(caseValues("ball")));
-  fitTo(`Fitting the ball to ${name}`, "press", () => body);
+  fitTo(`Fitting the ball to ${name}`, "press", () => body, name.replace(/\.\w+$/, ""));
 }
 
 /** Fit the ball, and take over its values unless others were entered in the meantime. */
-const fitTo = once(async (title, path, newBody) => {
+const fitTo = once(async (title, path, newBody, name) => {
   const requests = () => JSON.stringify([requestOf("ball"), requestOf("recording"), isTyping()]);
   const before = requests();
   const answer = await runAction(title, path, newBody());
@@ -217,14 +220,14 @@ const fitTo = once(async (title, path, newBody) => {
     showMessage("The fit was not taken over: values have changed since it began");
     return;
   }
-  showFit(answer);
+  showFit(answer, name);
 });
 
 /** Take over the values of a fit, and show its result beside them. */
-function showFit({ values, text, details, name }) {
-  takeValues(values);
+function showFit(answer, name) {
+  takeValues(answer.values);
   if (name) setTitle("ball", name);
-  fitted = { text, details, isNew: true, values: JSON.stringify(caseValues("ball")) };
+  fitted = { answer, isNew: true, values: JSON.stringify(caseValues("ball")) };
   openDoor("ball");
 }
 
@@ -239,7 +242,7 @@ const improve = once(async (title) => {
   const { door } = state;
   const request = requestOf(door);
   const values = JSON.stringify(caseValues(door));
-  const { changes, none, note } = await runAction(title, "improve", values);
+  const answer = await runAction(title, "improve", values);
   await runningJob()?.end;
   if (state.door !== door || requestOf(door) !== request) return;
   const apply = ({ key, value }) => {
@@ -249,7 +252,10 @@ const improve = once(async (title) => {
     takeValues(values);
     openDoor(door);
   };
-  const list = changes.map((change) => element("li", {}, `${change.text} `, button("Apply", () => apply(change))));
-  byId("result").replaceChildren(changes.length ? element("ul", {}, ...list) : element("p", {}, none), element("p", { class: "help" }, note));
+  const list = answer.changes.map((change) => element("li", {},
+    `${changeText(change, JSON.parse(values))} `, button("Apply", () => apply(change))));
+  byId("result").replaceChildren(
+    list.length ? element("ul", {}, ...list) : element("p", {}, noChangeText(answer)),
+    element("p", { class: "help" }, CHANGE_NOTES[door]));
   byId("result").scrollIntoView({ block: "nearest" });
 });

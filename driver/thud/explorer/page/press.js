@@ -1,8 +1,9 @@
 // The curve of a press, from which the modulus of the ball is fitted.
 import { element, fileZone } from "thud/page.js";
 
-const HELP = "Deflection and force on the loading branch, with units in the titles, such as "
-  + "“Deflection, mm” and “Force, N”";
+const HELP = "Deflection and force, with units in the titles, such as “Deflection, mm” and “Force, N”. "
+  + "The loading branch determines the modulus, with radius and wall as stated; a press measures "
+  + "slowly: in an impact rubber is stiffer";
 
 /** Return the folded choice of a file; `onPress` is called with the form to fit and its name. */
 export function pressInputs(onPress) {

@@ -76,20 +76,22 @@ function closest(values, isOwn, candidates) {
   return results.sort((one, other) => one.changes.size - other.changes.size)[0];
 }
 
-function keyValue(values, key) {
+/** Return the value of a key, "group.key", in values or by default. */
+export function keyValue(values, key) {
   const [group, name] = key.split(".");
   return values[group]?.[name] ?? defaultOf(findField(group, name), values.model?.name);
 }
 
-/** Return the text of the value of a key, "group.key", in the unit of its field. */
-function valueText(values, key) {
-  const [group, name] = key.split(".");
-  const field = findField(group, name);
-  const value = keyValue(values, key);
-  if (typeof value === "number") return `${Number(scaled(value, -(field?.power ?? 0)).toPrecision(4))} ${field?.unit ?? ""}`.trim();
+const valueText = (values, key) => shownValue(key, keyValue(values, key));
+
+/** Return the text of a value of a key, in the unit of its field. */
+export function shownValue(key, value, hasUnit = true) {
+  const { power = 0, unit = "", choices } = findField(...key.split(".")) ?? {};
   if (typeof value === "boolean") return value ? "on" : "off";
-  if (Array.isArray(value)) return `${value.join(" ")} ${field?.unit ?? ""}`.trim();
-  return field?.choices?.[value] ?? String(value);
+  if (typeof value === "string") return choices?.[value] ?? value;
+  const numbers = [value].flat().map((number) =>
+    (typeof number === "number" ? Number(scaled(number, -power).toPrecision(4)) : number));
+  return `${numbers.join(" ")} ${hasUnit ? unit : ""}`.trim();
 }
 
 /** Return name and value of a key; with a floor, fields with the same label have the name of their group, and behind the name of a construction its values are changed ones. */
