@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base._schema import HollowSphere, ModalBall, TwoMass
+from thud.base._schema import HollowSphere, ModalBall
 from thud.explorer.series import TIME_RANGE, thin_out, to_json
 
 if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
     from thud.impact.impact import Impact
 
     Answer = dict[str, Any]
@@ -22,35 +24,36 @@ DECIMALS = 1
 
 
 def motion_of(impact: Impact) -> Answer | None:
-    """Return the motion of a source on a rigid floor, mm, at times, ms.
+    """Return the outer and inner line of a source on a rigid floor, mm, at times, ms.
 
-    The kind is ``"section"`` (lines ``outer`` and ``inner`` at each instant), ``"sphere"`` (one
-    that is flattened by its ``deflection``) or ``"masses"`` (``deflection`` of belt and rim). None
-    for models without a shape.
+    They are computed by finite elements, and else those of a sphere that is flattened by the
+    deflection. None for models that are no ball.
     """
-    model, ball = impact.case.model, impact.case.ball
+    motion = impact.motion
+    if motion is None and not isinstance(impact.case.model, HollowSphere | ModalBall):
+        return None
     end = impact.touch_time + TIME_RANGE * impact.contact_time
-    times = impact.time if impact.motion is None else impact.motion.time
+    times = impact.time if motion is None else motion.time
     chosen = thin_out(np.flatnonzero(times <= end), MAX_INSTANTS)
-    answer: Answer = {"time": to_json(1e3 * (times[chosen] - impact.touch_time))}
-    if impact.motion is not None:
-        position = impact.motion.position[chosen]
-        points = thin_out(np.arange(position.shape[1]), MAX_POINTS)
-        lines = {
-            name: np.round(1e3 * position[:, points, ring], DECIMALS).tolist()
-            for name, ring in (("outer", -1), ("inner", 0))
-        }
-        return answer | lines | {"kind": "section", "caption": "Computed section."}
-    if isinstance(model, HollowSphere | ModalBall):
-        size = {"radius": 1e3 * ball.outer_radius, "wall": 1e3 * ball.wall_thickness}
-        deflection = to_json(1e3 * impact.deflection[chosen])
-        caption = "A sphere, flattened by the deflection of the ball."
-        return answer | size | {"kind": "sphere", "deflection": deflection, "caption": caption}
-    if isinstance(model, TwoMass):
-        masses = {
-            name: to_json(1e3 * impact.model_histories[f"{name}_displacement_m"][chosen])
-            for name in ("belt", "rim")
-        }
-        caption = "Belt and rim, lowered by their displacements: the model has no other shape."
-        return answer | {"kind": "masses", "deflection": masses, "caption": caption}
-    return None
+    lines = _flattened(impact, chosen)
+    if motion is not None:
+        points = thin_out(np.arange(motion.position.shape[1]), MAX_POINTS)
+        lines = motion.position[chosen][:, points][:, :, [-1, 0]].swapaxes(1, 2)
+    outer, inner = np.round(1e3 * lines, DECIMALS).swapaxes(0, 1).tolist()
+    return {
+        "time": to_json(1e3 * (times[chosen] - impact.touch_time)),
+        "outer": outer,
+        "inner": inner,
+        "is_computed": motion is not None,
+    }
+
+
+def _flattened(impact: Impact, chosen: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Return outer and inner line, m, of a hollow sphere flattened at the chosen instants."""
+    ball = impact.case.ball
+    deflection = np.maximum(impact.deflection[chosen], 0.0)[:, None, None]
+    walls = np.array([0.0, ball.wall_thickness])[:, None]
+    angles = np.linspace(0.0, np.pi, MAX_POINTS)
+    radius = ball.outer_radius - walls
+    height = np.maximum(walls, ball.outer_radius - deflection - radius * np.cos(angles))
+    return np.stack(np.broadcast_arrays(radius * np.sin(angles), height), axis=-1)
