@@ -17,25 +17,21 @@ from typing import IO, TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-START = "import sys; from thud.__main__ import main; {}; sys.exit(main())"
 Served = tuple[str, "subprocess.Popen[str]"]
 
 
 @contextmanager
-def serve(*arguments: str, before: str = "pass", screen: IO[str] | None = None) -> Iterator[Served]:
+def serve(*arguments: str, screen: IO[str] | None = None) -> Iterator[Served]:
     """Yield the address of a server, and its process.
 
     Parameters
     ----------
     *arguments
         Of the command.
-    before
-        Python that runs before it.
     screen
         File of the standard error; by default that of this process.
     """
-    start = START.format(before)
-    command = [sys.executable, "-c", start, "explore", "--no-browser", *arguments]
+    command = [sys.executable, "-m", "thud", "explore", "--no-browser", *arguments]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=screen, text=True) as process:
         assert process.stdout is not None
         address = re.search(r"http\S+", process.stdout.readline())
@@ -57,8 +53,7 @@ def place_of(address: str) -> tuple[str, int, str]:
 def answer_of(connection: HTTPConnection, token: str, values: dict[str, Any]) -> dict[str, Any]:
     """Return the answer to a case."""
     connection.request("POST", "/solve", json.dumps(values), {"X-Thud-Token": token})
-    last = connection.getresponse().read().decode().splitlines()[-1]
-    answer: dict[str, Any] = json.loads(last)["answer"]
+    answer: dict[str, Any] = json.loads(connection.getresponse().read())["answer"]
     return answer
 
 

@@ -59,14 +59,6 @@ def new_case(values: Mapping[str, Mapping[str, object]]) -> Case:
     return case
 
 
-def answer_quickly(case: Case) -> Answer | None:
-    """Return the answer of a case, or None for elements: they take too long while a slider moves.
-
-    Raise InputError if the case is invalid.
-    """
-    return None if isinstance(case.model, FiniteElement) else answer_case(case)
-
-
 def answer_case(case: Case) -> Answer:
     """Return force, levels, verdict and warnings, and motion, floor and room if they exist."""
     if isinstance(case.model, FiniteElement):

@@ -7,17 +7,15 @@ import resource
 import signal
 import tempfile
 import threading
-from collections.abc import Generator
 from contextlib import suppress
-from multiprocessing import forkserver, get_context
+from multiprocessing import forkserver, get_context, parent_process
 from typing import TYPE_CHECKING, Any
 
 import anyio
 from tqdm import tqdm
 
-from thud.base.bridge import progress
 from thud.base.errors import ThudError
-from thud.explorer.answer import answer_case, answer_quickly, new_case
+from thud.explorer.answer import answer_case, new_case
 from thud.explorer.downloads import DOWNLOADS
 from thud.explorer.fits import fit_press, fit_recording
 from thud.explorer.improve import improve
@@ -31,10 +29,8 @@ if TYPE_CHECKING:
 
     Report = dict[str, Any]
 
-# Functions of the tasks by name; arguments and return values are plain data. Generators yield begin
-# and end of the fraction of the work that the next computation is.
+# Functions of the tasks by name; arguments and return values are plain data.
 TASKS: dict[str, Callable[..., Any]] = {
-    "quick case": lambda values: answer_quickly(new_case(values)),
     "case": lambda values: answer_case(new_case(values)),
     "recording": answer_recording,
     "report": calibration_report,
@@ -45,8 +41,6 @@ TASKS: dict[str, Callable[..., Any]] = {
 }
 # Errors of invalid values; values of wrong types raise TypeError or ValueError when they are used.
 INPUT_ERRORS = (ThudError, TypeError, ValueError, KeyError, OverflowError)
-# Time between two reports, s.
-INTERVAL = 0.05
 # Maximum memory of a task, bytes, as small files can hold long recordings.
 MAX_MEMORY = 4_000_000_000
 
@@ -54,9 +48,7 @@ MAX_MEMORY = 4_000_000_000
 class Jobs:
     """Processes that run a limited number of tasks concurrently; other tasks wait."""
 
-    def __init__(
-        self, width: int, time_limit: float, *, late: Report | None = None, reuse: bool = False
-    ) -> None:
+    def __init__(self, width: int, time_limit: float) -> None:
         """Start the server that forks the processes.
 
         Parameters
@@ -65,51 +57,43 @@ class Jobs:
             Maximum number of concurrent tasks.
         time_limit
             Maximum duration of a task, s.
-        late
-            Last report of a task that exceeds the time limit; by default an error.
-        reuse
-            Use a process for several tasks; requires that tasks do not change global state.
         """
         # The fork server has loaded the modules, so that new processes start immediately.
         self._context = get_context("forkserver")
         self._context.set_forkserver_preload([__name__])
         forkserver.ensure_running()
-        # A semaphore, as it may be released by another task of anyio than the one that acquired it.
         self._slots = anyio.Semaphore(width)
         self._time_limit = time_limit
-        message = f"the computation takes longer than {time_limit:g} s; allowed: less"
-        self._late = late or {"error": message}
-        self._reuse = reuse
         self._idle: list[tuple[ForkServerProcess, Connection]] = []
 
     async def run(self, task: str, *arguments: object) -> AsyncGenerator[Report, None]:
-        """Yield reports ``{"done": fraction}``, then ``{"answer": …}`` or ``{"error": message}``.
+        """Yield the report of a task: ``{"answer": …}`` or ``{"error": message}``.
 
-        The first report precedes the start of the task. If the caller stops iterating, the process
-        is killed and its temporary files are removed.
+        If the caller stops iterating, the process is killed and its temporary files are removed;
+        otherwise it runs further tasks.
         """
-        report: Report = {"done": 0.0}
-        yield report
         async with self._slots:
             with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
                 process, connection, child_end = self._take()
-                reusable = False
+                request, is_finished = (folder, task, arguments), False
                 try:
                     if child_end:
                         with child_end:
                             await anyio.to_thread.run_sync(process.start)
-                    end = anyio.current_time() + self._time_limit
-                    request = (folder, task, arguments)
-                    report = await self._call(end, _exchange, connection, request)
-                    while "done" in report:
-                        yield report
-                        report = await self._call(end, connection.recv)
-                    reusable = self._reuse and report is not self._late
+                    with anyio.fail_after(self._time_limit):
+                        # An abandoned thread ends when its process is killed.
+                        report = await anyio.to_thread.run_sync(
+                            _exchange, connection, request, abandon_on_cancel=True
+                        )
+                    is_finished = True
+                except TimeoutError:
+                    limit = f"{self._time_limit:g} s"
+                    report = {"error": f"the computation takes longer than {limit}; allowed: less"}
                 except (EOFError, OSError):
                     message = "the computation ended without an answer, perhaps for lack of memory"
                     report = {"error": message}
                 finally:
-                    if reusable:
+                    if is_finished:
                         self._idle.append((process, connection))
                     else:
                         _kill(process)
@@ -128,20 +112,9 @@ class Jobs:
         process = self._context.Process(target=_run_tasks, args=(child_end,), daemon=True)
         return process, connection, child_end
 
-    async def _call(
-        self, end: float, function: Callable[..., Report], *arguments: object
-    ) -> Report:
-        """Return the report of a function in a thread, or the late report at time `end`.
-
-        An abandoned thread ends when its process is killed.
-        """
-        with anyio.CancelScope(deadline=end):
-            return await anyio.to_thread.run_sync(function, *arguments, abandon_on_cancel=True)
-        return self._late
-
 
 def _exchange(connection: Connection, request: object) -> Report:
-    """Send a request to a process; return its first report."""
+    """Send a request to a process; return its report."""
     connection.send(request)
     report: Report = connection.recv()
     return report
@@ -155,6 +128,7 @@ def _kill(process: ForkServerProcess) -> None:
 
 def _run_tasks(connection: Connection) -> None:
     """Run the tasks that arrive in this process until the server ends."""
+    threading.Thread(target=_end_with_server, daemon=True).start()
     # An interrupt may reach the whole process group, but the server kills this process itself.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # The default lock is a semaphore of the system, which would outlive a killed process.
@@ -162,42 +136,25 @@ def _run_tasks(connection: Connection) -> None:
     resource.setrlimit(resource.RLIMIT_AS, (MAX_MEMORY, MAX_MEMORY))
     with suppress(EOFError, OSError):
         while True:
-            tempfile.tempdir, task, arguments = connection.recv()
-            connection.send(_run_task(connection, task, arguments))
+            folder, task, arguments = connection.recv()
+            tempfile.tempdir = folder
+            os.chdir(folder)
+            connection.send(_run_task(task, arguments))
 
 
-def _run_task(connection: Connection, task: str, arguments: tuple[Any, ...]) -> Report:
-    """Return the last report of a task, after sending reports of its progress."""
-    finished = threading.Event()
-    span = [0.0, 1.0]
+def _end_with_server() -> None:
+    """End this process, whatever it computes, if the server has been killed."""
+    if server := parent_process():
+        server.join()
+        os._exit(1)
 
-    def report_progress() -> None:
-        try:
-            while not finished.wait(INTERVAL):
-                begin, end = span
-                connection.send({"done": begin + (end - begin) * progress()})
-        except OSError:
-            os._exit(1)
 
-    thread = threading.Thread(target=report_progress, daemon=True)
-    thread.start()
+def _run_task(task: str, arguments: tuple[Any, ...]) -> Report:
+    """Return the report of a task."""
     try:
-        return {"answer": _finish(TASKS[task](*arguments), span)}
+        return {"answer": TASKS[task](*arguments)}
     except MemoryError:
         limit = f"{MAX_MEMORY / 1e9:g} GB"
         return {"error": f"the computation needs more than {limit} of memory; allowed: less"}
     except (*INPUT_ERRORS, OSError) as error:
         return describe_error(error)
-    finally:
-        finished.set()
-        thread.join()
-
-
-def _finish(answer: Any, span: list[float]) -> Any:  # noqa: ANN401 - of any task
-    """Return an answer, after the work of a generator; `span` is the fraction of its next step."""
-    while isinstance(answer, Generator):
-        try:
-            span[:] = next(answer)
-        except StopIteration as end:
-            answer = end.value
-    return answer

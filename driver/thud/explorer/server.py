@@ -7,7 +7,7 @@ import re
 import secrets
 import shutil
 import socket
-from contextlib import AsyncExitStack, aclosing
+from contextlib import AsyncExitStack
 from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -65,10 +65,8 @@ MAX_HEAD = 16_384
 TOKEN = "x-thud-token"  # noqa: S105 - its name
 # Level of compression: higher ones save a few percent and take twice as long.
 COMPRESSION = 6
-# Time limits of a task and of a task that is expected to be quick, s; after that it runs again as a
-# slow task.
+# Time limit of a task, s.
 TIME_LIMIT = 300.0
-QUICK_TIME_LIMIT = 1.0
 # Headers of all responses; the page has its own policy.
 HEADERS = [
     ("Cache-Control", "no-cache"),
@@ -78,7 +76,7 @@ HEADERS = [
 
 
 def new_application(
-    start: Mapping[str, Any], *, token: str, hosts: tuple[str, ...], width: int = 2
+    start: Mapping[str, Any], *, token: str, hosts: tuple[str, ...], width: int = 4
 ) -> Starlette:
     """Return the application.
 
@@ -91,8 +89,7 @@ def new_application(
     hosts
         Host names in requests that the server accepts.
     width
-        Maximum number of concurrent slow tasks; the maximum number of quick tasks is twice as
-        large.
+        Maximum number of concurrent tasks.
     """
     if not token:
         refuse("the token is empty", "a secret text")
@@ -104,7 +101,7 @@ def new_application(
             *(
                 Route(path, _guarded(endpoint, limit), methods=["POST"])
                 for path, endpoint, limit in (
-                    ("/solve", _solve, MAX_CASE),
+                    ("/solve", _with_case("case"), MAX_CASE),
                     ("/improve", _with_case("improve"), MAX_CASE),
                     *((f"/download/{name}", _with_case(name), MAX_CASE) for name in DOWNLOADS),
                     ("/measure", _with_files("recording", "table"), MAX_RECORDING),
@@ -141,8 +138,7 @@ def new_application(
         for group, name in FILE_KEYS
     ]
     application.state.token = token
-    application.state.slow = Jobs(width, TIME_LIMIT)
-    application.state.quick = Jobs(2 * width, QUICK_TIME_LIMIT, late={"answer": None}, reuse=True)
+    application.state.jobs = Jobs(width, TIME_LIMIT)
     return application
 
 
@@ -155,35 +151,18 @@ async def _about(request: Request) -> Response:
     return JSONResponse(request.app.state.about)
 
 
-async def _solve(request: Request) -> Response:
-    values, state = _case(request, await request.body()), request.app.state
-
-    async def reports() -> Reports:
-        """Yield the quick answer alone, or the reports of a slow task."""
-        async with aclosing(state.quick.run("quick case", values)) as quick:
-            async for report in quick:
-                if report.get("answer") or "error" in report:
-                    yield report
-                    return
-        async with aclosing(state.slow.run("case", values)) as slow:
-            async for report in slow:
-                yield report
-
-    return _Reports(reports(), AsyncExitStack())
-
-
 def _with_case(task: str) -> Endpoint:
-    """Return an endpoint that sends the reports of a slow task on a case."""
+    """Return an endpoint that sends the report of a task on a case."""
 
     async def answer(request: Request) -> Response:
         values = _case(request, await request.body())
-        return _Reports(request.app.state.slow.run(task, values), AsyncExitStack())
+        return _Reports(request.app.state.jobs.run(task, values), AsyncExitStack())
 
     return answer
 
 
 def _with_files(task: str, *names: str) -> Endpoint:
-    """Return an endpoint that sends the reports of a slow task on the files of a form.
+    """Return an endpoint that sends the report of a task on the files of a form.
 
     The arguments of the task are the paths of copies of the files, and the values of the named
     fields of the form.
@@ -201,7 +180,7 @@ def _with_files(task: str, *names: str) -> Endpoint:
                 if not files:
                     raise HTTPException(400, "the request contains no form with a file")
                 paths = await anyio.to_thread.run_sync(_copy, files, folder)
-            reports = request.app.state.slow.run(task, paths, *values)
+            reports = request.app.state.jobs.run(task, paths, *values)
             return _Reports(reports, stack.pop_all())
 
     return answer

@@ -6,6 +6,8 @@ import { isLaboratory, recording, recordingBody, statedTable } from "thud/record
 
 // Pause before a slow case is requested, and before outdated results are dimmed, ms.
 export const PAUSE = 120;
+// Time after which a task is slow, ms.
+const SLOW = 250;
 // Time between attempts to reach the server, ms.
 export const RETRY_INTERVAL = 1500;
 /** The current variant of each door, and those that were kept. */
@@ -134,19 +136,15 @@ export function once(action) {
 
 // ---- Tasks of the server.
 
-/** Return the answer of a task; show its progress and a button to cancel it. */
-export async function runTask(name, path, body, controller, { showNow, onReport = () => {} }) {
-  const bar = element("progress", { max: 1, "aria-label": name });
-  const line = element("div", { class: "task" }, element("span", {}, name), bar, button("Cancel", () => controller.abort()));
-  const showTask = () => { if (!line.isConnected) byId("tasks").append(line); };
-  if (showNow) showTask();
+/** Return the answer of a task; if it is slow, show that it runs, and a button to cancel it. */
+export async function runTask(name, path, body, controller, onSlow = () => {}) {
+  const line = element("div", { class: "task" }, element("span", {}, name),
+    element("progress", { "aria-label": name }), button("Cancel", () => controller.abort()));
+  const slow = setTimeout(() => { byId("tasks").append(line); onSlow(); }, SLOW);
   try {
-    return await follow(path, body, controller.signal, (fraction) => {
-      showTask();
-      if (fraction > 0) bar.value = fraction;
-      onReport();
-    });
+    return await follow(path, body, controller.signal);
   } finally {
+    clearTimeout(slow);
     line.remove();
   }
 }
@@ -199,14 +197,20 @@ export async function solve() {
 
 async function compute(thisJob, door) {
   const [values, { chosen }] = [caseValues(door), state];
-  const answer = await runTask("Computing", "solve", JSON.stringify(values), thisJob.controller, { onReport: () => { thisJob.slow = true; showStatus(); } });
+  const onSlow = () => {
+    thisJob.slow = true;
+    if (thisJob.repeat) thisJob.controller.abort();
+    showStatus();
+  };
+  const body = JSON.stringify(values);
+  const answer = await runTask("Computing", "solve", body, thisJob.controller, onSlow);
   return { values, chosen, answer };
 }
 
 async function assess(thisJob) {
   const [{ name }, ...others] = recording.files.filter((file) => !isLaboratory(file));
   const title = `Assessing ${recording.files.map((file) => file.name).join(", ")}`;
-  const answer = await runTask(title, "measure", recordingBody(), thisJob.controller, { showNow: true });
+  const answer = await runTask(title, "measure", recordingBody(), thisJob.controller);
   const drops = `${answer.drops} drop${answer.drops === 1 ? "" : "s"}`;
   const asks = answer.asks.filter((ask) => Object.keys(ask.values).some((key) => !(key in state.recording)));
   return { name: `${others.length ? `${name} and ${others.length} more` : name}, ${drops}`, answer: { ...answer, asks } };

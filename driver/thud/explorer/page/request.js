@@ -1,4 +1,4 @@
-// Requests to the server. Each has the token; long computations answer with a stream of reports.
+// Requests to the server. Each has the token.
 import { storeText, stored } from "thud/storage.js";
 
 /** Error that the server reports; `field` is the field it is about, or null. */
@@ -52,26 +52,15 @@ export async function ask(path, options = {}) {
   throw response.status === 403 ? new ConnectionError(report.error) : new ServerError(report);
 }
 
-/** Return the answer at the end of a stream of reports; `onProgress` gets the fraction done. */
-export async function follow(path, body, signal = null, onProgress = () => {}) {
+/** Return the answer of a task of the server. */
+export async function follow(path, body, signal = null) {
   const response = await ask(path, { method: "POST", body, signal });
-  const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
-  let rest = "";
-  for (;;) {
-    const { value, done } = await reader.read().catch((error) => {
-      if (error.name === "AbortError") throw error;
-      return { done: true };
-    });
-    const lines = (rest + (value ?? "")).split("\n");
-    rest = done ? "" : lines.pop();
-    for (const line of lines.filter(Boolean)) {
-      const report = JSON.parse(line);
-      if ("answer" in report) return report.answer;
-      if ("error" in report) throw new ServerError(report);
-      onProgress(report.done);
-    }
-    if (done) throw new ConnectionError(`The server has stopped; ${restart()}`);
-  }
+  const report = await response.json().catch((error) => {
+    if (error.name === "AbortError") throw error;
+    throw new ConnectionError(`The server has stopped; ${restart()}`);
+  });
+  if ("error" in report) throw new ServerError(report);
+  return report.answer;
 }
 
 /** What the server says of itself, requested before the rest of the page has arrived. */
