@@ -14,7 +14,7 @@ from scipy.stats import binomtest, spearmanr
 
 import thud
 from thud.base._schema import MODELS, STANDARD_BALL
-from thud.base.tables import format_rows, unmarked, wrap
+from thud.base.tables import format_rows, wrap
 from thud.cli import main
 from thud.impact.compute import compute
 from thud.level.assessment import wilson_interval
@@ -198,7 +198,7 @@ def test_command_writes_what_it_prints(
     thud.write_case(case, "soft.nml")
     verdict = thud.assess(case)
     assert main(["assess", "--check", "soft.nml"]) == 3
-    assert unmarked(wrap(format_rows(verdict.rows()))) in capsys.readouterr().out
+    assert wrap(format_rows(verdict.rows())) in capsys.readouterr().out
     text = (tmp_path / "outputs/soft_verdict/verdict.csv").read_text()
     assert text == verdict.to_csv()
     assert text.count("\n") == 2 + len(verdict.criteria)
@@ -207,9 +207,7 @@ def test_command_writes_what_it_prints(
 def test_page_shows_the_verdict() -> None:
     page = (REPOSITORY / "docs/verdict.md").read_text()
     verdict = thud.assess(thud.Case(ball=thud.Ball(youngs_modulus=1.46e6)))
-    shown = unmarked(
-        "\n".join([format_rows(verdict.rows()), *(note.message for note in verdict.notes)])
-    )
+    shown = "\n".join([format_rows(verdict.rows()), *(note.message for note in verdict.notes)])
     assert f"\n{wrap(shown)}\n" in page
 
 

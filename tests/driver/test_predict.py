@@ -20,7 +20,6 @@ from test_figure_look import assert_clean
 
 import thud
 from thud import cli
-from thud.base.tables import unmarked
 from thud.floors.description import CONTRIBUTIONS, rating_title, verdict_text
 from thud.floors.resonances import floor_frequencies, resonances, room_frequencies
 from thud.plot.room_figures import draw_levels
@@ -362,7 +361,7 @@ def test_command_prints_and_writes(
     prediction = thud.predict_level(floor=case.floor, room=case.room)
     floor = PredictedFloor("my floor", "my_floor", prediction)
     shown = " ".join(printed.split())
-    assert " ".join(unmarked(screen_text(floor)).split()) in shown
+    assert " ".join(screen_text(floor).split()) in shown
     assert verdict_text(prediction) in shown
     pages = ["my_floor.html", "concrete_140.html"]
     assert {*TABLES, "changes.csv", *pages} <= {*names_in(out)}

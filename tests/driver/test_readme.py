@@ -11,7 +11,7 @@ from conftest import REPOSITORY
 
 import thud
 from thud import cli
-from thud.base.tables import WIDTH, format_rows, unmarked, wrap
+from thud.base.tables import WIDTH, format_rows, wrap
 from thud.comparison.comparison import read_all
 
 README = (REPOSITORY / "README.md").read_text(encoding="utf-8")
@@ -35,7 +35,7 @@ def test_first_result_is_that_of_the_commands() -> None:
     assert cases is not None
     paths = [str(REPOSITORY / path) for path in cases[1].split()]
     page = thud.compare(read_all(paths))
-    expected = unmarked(wrap(format_rows(page.rows())))
+    expected = wrap(format_rows(page.rows()))
     shown = shown_after("assessed force")
     assert without_times(shown) == [
         *without_times(expected), "Results: outputs/comparison"

@@ -806,7 +806,7 @@ def test_notes_that_differ_in_numbers_are_one_sentence(one: Recording) -> None:
         replace(third, notes=()),
     ]
     assert group_notes(drops, "drops", lambda note: not note.is_warning) == [
-        "hum of 50 Hz with an amplitude of -3.5 to 12 N was removed (2 of 3 drops)",
+        "hum of 50 Hz, amplitude -3.5 to 12 N, was removed (2 of 3 drops)",
         f"an offset of 4 N was removed ({second.name})",
     ]
     assert len(group_notes(drops, "drops", lambda note: note.is_warning)) == 1
@@ -819,7 +819,7 @@ def test_drops_that_were_left_out_are_listed(one: Recording) -> None:
     )
     origin = replace(one.origins[0], notes=notes)
     (text,) = group_notes([origin], "files", lambda _: True)
-    assert text == "left out: drop 2, 5 to 7 at 1.00 to 3.50 s, touched"
+    assert text == "left out: drop 2, 5, 6, 7 at 1.00 to 3.50 s, touched"
 
 
 @pytest.mark.parametrize(

@@ -110,23 +110,17 @@ def factor_to(unit: str, text: str, label: str, allowed: str = "") -> float:
     return size / UNITS[unit][1]
 
 
-def powers_of(key_unit: str) -> dict[str, int]:
-    """Return the units of a key, with the power of ten that converts each to that of the key.
-
-    >>> powers_of("s")
-    {'s': 0, 'ms': -3, 'us': -6, 'ns': -9}
-    """
-    sizes = SIZES.get(key_unit, {key_unit: 1.0})  # others have no multiples
-    powers = {unit: round(math.log10(size)) for unit, size in sizes.items()}
-    return {unit: power for unit, power in powers.items() if scaled(1.0, power) == sizes[unit]}
-
-
 def power_of(unit: object, key_unit: str, label: str) -> int:
     """Return the power of ten that converts a unit to the unit of a key.
 
     Raise InputError if the unit does not fit; its message begins with `label`.
+
+    >>> power_of("us", "s", "contact time")
+    -6
     """
-    powers = powers_of(key_unit)
+    sizes = SIZES.get(key_unit, {key_unit: 1.0})  # others have no multiples
+    powers = {unit: round(math.log10(size)) for unit, size in sizes.items()}
+    powers = {unit: power for unit, power in powers.items() if scaled(1.0, power) == sizes[unit]}
     return powers[require_choice(f"{label}: unit", unit, powers)]
 
 
@@ -149,12 +143,12 @@ def quantity(text: str) -> float:
     0.032
     """
     require_kind("quantity", text, str)
-    units = {unit: power for base in SIZES for unit, power in powers_of(base).items()}
+    units = {unit: size for sizes in SIZES.values() for unit, size in sizes.items()}
     match = NUMBER.match(text)
     if match is None:
         refuse_value("quantity", text, "a number and its unit, such as '32 mm'")
     unit = require_choice(f"quantity {shown(text)}: unit", text[match.end() :].strip(), units)
-    value = scaled(float(match[1]), units[unit]) if math.isfinite(float(match[1])) else math.inf
+    value = float(Decimal(repr(float(match[1]))) * Decimal(repr(units[unit])))
     return require_number(f"quantity {shown(text)}", value) + 0.0
 
 

@@ -8,26 +8,21 @@ from typing import TYPE_CHECKING, TextIO
 
 from tqdm import tqdm
 
-from thud.base.tables import END_MARK, MARKS, WIDTH, unmarked, wrap
+from thud.base.tables import WIDTH, wrap
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     from thud.base.note import Note
 
-RED, GREEN, YELLOW = 31, 32, 33
-# Colors of verdicts by their marks.
-_COLORS = dict(zip(MARKS.values(), (GREEN, RED, YELLOW), strict=True))
+RED, YELLOW = 31, 33
+# The library marks verdicts by these characters, which its own command shows as colors.
+_MARKS = dict.fromkeys(range(1, 5))
 
 
 def print_results(text: str) -> None:
-    """Print results above any progress bar, with colored verdicts if a terminal shows colors."""
-    lines = wrap(text)
-    if _has_colors(sys.stdout):
-        for mark, color in _COLORS.items():
-            lines = lines.replace(mark, _sequence(color))
-        lines = lines.replace(END_MARK, _sequence(0))
-    tqdm.write(unmarked(lines), file=sys.stdout)
+    """Print results above any progress bar."""
+    tqdm.write(wrap(text.translate(_MARKS)), file=sys.stdout)
 
 
 def print_path(title: str, path: object) -> None:
@@ -68,17 +63,8 @@ def _print_message(message: str, color: int) -> None:
     text = f"{name} {message}"
     if is_terminal(sys.stderr):
         text = wrap(text)
-    if _has_colors(sys.stderr):
-        text = text.replace(name, f"{_sequence(color)}{name}{_sequence(0)}", 1)
-    tqdm.write(text, file=sys.stderr)
-
-
-def _has_colors(stream: TextIO) -> bool:
-    """Whether a stream is a terminal with colors, and the user wants them (no-color.org)."""
+    # See no-color.org.
     wanted = not os.environ.get("NO_COLOR") and os.environ.get("TERM", "dumb") not in {"", "dumb"}
-    return wanted and is_terminal(stream)
-
-
-def _sequence(color: int) -> str:
-    """Return the control sequence of ECMA-48 for a color, 0 for none."""
-    return f"\033[{color}m"
+    if wanted and is_terminal(sys.stderr):
+        text = text.replace(name, f"\033[{color}m{name}\033[0m", 1)
+    tqdm.write(text, file=sys.stderr)

@@ -20,7 +20,6 @@ from thud.base.checks import refuse, refuse_value, require_choice, require_kind
 from thud.base.display import Displayed
 from thud.base.errors import PlausibilityWarning, ThudError
 from thud.base.files import Results
-from thud.base.tables import Result
 from thud.case.case import Case, read_case
 from thud.impact.compute import compute
 from thud.impact.impact import Impact
@@ -112,7 +111,7 @@ class Comparison(Displayed):
             peak.label: peak.show(impact.peak(self.force)),
             **{other.label: other.show(impact.quantity(other.name)) for other in others},
             "computing time, ms": f"{1e3 * seconds:.3g}" if seconds else "",
-            "verdict": Result(verdict.conforms, verdict.conforms),
+            "verdict": verdict.conforms,
         }
 
     def plot(self) -> Figure:
@@ -146,7 +145,7 @@ def _cell(criterion: Criterion) -> str:
     if verdict == VERDICTS[0]:
         return text
     state = "low" if criterion.value < criterion.lower else "high"
-    return Result(f"{text} {state if verdict == VERDICTS[1] else verdict}", verdict)
+    return f"{text} {state if verdict == VERDICTS[1] else verdict}"
 
 
 # Values of a mapping are checked when they are used: mypy infers no type for several kinds.

@@ -14,7 +14,6 @@ from thud.base.checks import refuse, require_kind, require_mapping
 from thud.base.display import Tabulated
 from thud.base.errors import ThudError
 from thud.base.files import Results
-from thud.base.tables import Result
 from thud.case.case import Case
 from thud.case.constructions import Construction, with_floor
 from thud.floors.description import rating_text, rating_title, source_note
@@ -78,7 +77,7 @@ class FloorComparison(Tabulated):
             "class (KS F 2863-2)": ([class_text(p.korean_class) for p in predictions], ""),
             "required, dB": ([r.limit if r else np.nan for r in required], "g"),
             "required rating": ([r.rating.name if r else "" for r in required], ""),
-            "verdict": ([Result(r.verdict, r.verdict) if r else "" for r in required], ""),
+            "verdict": ([r.verdict if r else "" for r in required], ""),
             "probability, %": ([100 * r.probability if r else np.nan for r in required], ".0f"),
             **{
                 f"{frequency:g} Hz octave, dB": (levels, ".1f")

@@ -23,7 +23,6 @@ from thud.base.checks import (
 from thud.base.display import Displayed, Tabulated
 from thud.base.immutable import Immutable, plain
 from thud.base.key import Quantity
-from thud.base.tables import Result
 from thud.level.estimate import NORMAL_FACTOR, NUMERICAL_ERROR, Estimate
 from thud.level.levels import BANDWIDTHS, SOURCES, get_bands
 
@@ -224,12 +223,12 @@ class Criterion(Outcome):
             width, *last = (f"{low} to {high}", self._last_cells()[0], self.main_unknown)
             if low == high:
                 width, *last = ("", "", "")
-            return (*first, width, self.shown_limits, *last, Result(result, result))
+            return (*first, width, self.shown_limits, *last, result)
         expanded = f"{scale * self.estimate.expanded:.2g}" if self.estimate.uncertainty else ""
         expanded = expanded.replace("nan", "unknown") + " †" * bool(self.estimate.not_stated)
         if result == VERDICTS[1]:
             result = "too low" if self.value < self.lower else "too high"
-        return (*first, expanded.strip(), self.shown_limits, Result(result, self.conforms))
+        return (*first, expanded.strip(), self.shown_limits, result)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -281,7 +280,7 @@ class Verdict(Outcome, Tabulated):
         legend = f"† lacks {', '.join(lacking)}" if lacking else ""
         last = ("all criteria", "", legend, "", *self._last_cells())
         rows = [criterion.cells() for criterion in self.criteria]
-        return [header, *rows, (*last, Result(self.conforms, self.conforms))]
+        return [header, *rows, (*last, self.conforms)]
 
     def columns(self) -> Columns:
         """Return the criteria in SI units, levels in dB; the last row is that of all."""

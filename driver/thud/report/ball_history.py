@@ -18,7 +18,6 @@ from thud.base._schema import VERDICTS
 from thud.base.checks import refuse
 from thud.base.files import read_input
 from thud.base.immutable import Immutable
-from thud.base.tables import Result
 from thud.recordings.words import read_date
 from thud.report.contents import FORMAT
 from thud.report.rows import capital, number, quantity_of, value_text
@@ -192,7 +191,7 @@ class History:
             slope = series.slope_text + " significant" * series.is_drifting
             rows.append(row(series.title, [*map(_cell, series.entries)], slope))
         rows.append(row("Temperature, °C", [*map(_degrees, self.temperatures)]))
-        verdicts = [Result(report["verdict"], report["verdict"]) for report in self.reports]
+        verdicts = [report["verdict"] for report in self.reports]
         rows.append(row("verdict", verdicts))
         return rows
 
@@ -233,7 +232,7 @@ def _cell(entry: dict[str, Any]) -> str:
     if verdict == VERDICTS[0] or entry["value"] is None:
         return value_text(entry)
     state = "low" if entry["value"] < entry["lower"] else "high"
-    return Result(f"{value_text(entry)} {state if verdict == VERDICTS[1] else verdict}", verdict)
+    return f"{value_text(entry)} {state if verdict == VERDICTS[1] else verdict}"
 
 
 def _degrees(value: float | None) -> str:

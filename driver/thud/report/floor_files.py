@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from thud.base._schema import RATED_BANDS
 from thud.base.bridge import version
 from thud.base.display import draw_all
-from thud.base.tables import csv_text, marked
+from thud.base.tables import csv_text
 from thud.floors.description import CAVEAT, source_note, verdict_text
 from thud.report.predicted_floor import tables
 
@@ -35,7 +35,7 @@ def screen_text(floor: PredictedFloor) -> str:
     lines = [
         floor.name,
         f"  {title}: {', '.join(filter(None, (text, source_note(prediction))))}",
-        *([f"  {marked(verdict_text(prediction), required.verdict)}"] if required else []),
+        *([f"  {verdict_text(prediction)}"] if required else []),
         f"  {CAVEAT.capitalize()}",
         *(f"    {title}: {text}" for title, _, _, text in others),
         f"    Octaves: {', '.join(f'{level:.1f} dB at {f:g} Hz' for f, level in octaves)}",

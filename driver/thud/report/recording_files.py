@@ -14,7 +14,7 @@ from thud.base.checks import refuse, require_kind, shown_text
 from thud.base.display import draw_all, warn_if_not_drawn
 from thud.base.errors import ReportWarning
 from thud.base.files import Results, read_input
-from thud.base.tables import csv_text, marked
+from thud.base.tables import csv_text
 from thud.recordings.recording import Recording
 from thud.report.contents import FORMAT, json_bytes, report_data
 from thud.report.rows import HEAD, criterion_row, reason_text
@@ -43,14 +43,14 @@ def table(criteria: Sequence[dict[str, Any]]) -> list[tuple[str, ...]]:
 
 
 def verdict_text(data: dict[str, Any]) -> str:
-    """Return the verdict of a report, marked, with its reason and a note on own limits."""
+    """Return the verdict of a report with its reason and a note on own limits."""
     verdict, criteria = data["verdict"], data["criteria"]
     is_undecided = verdict == VERDICTS[2]
     subject, relation = ("The result is", "by") if is_undecided else ("The source", "to")
     limits = f"the limits of the {data['source'].replace('_', ' ')}"
     has_own_limits = any(not criterion["limits_of_standard"] for criterion in criteria)
     note = " Limits marked * are those of the laboratory." if has_own_limits else ""
-    result = f"{subject} {marked(verdict, verdict)} {relation} {limits} at 95 %"
+    result = f"{subject} {verdict} {relation} {limits} at 95 %"
     return f"{result}: {reason_text(criteria)}.{note}"
 
 

@@ -6,7 +6,6 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from thud.base._schema import VERDICTS
-from thud.base.tables import Result
 from thud.level.assessment import criterion_quantity
 from thud.level.estimate import NORMAL_FACTOR
 from thud.recordings.instruments import AMPLITUDE_DECIBEL
@@ -63,7 +62,7 @@ def criterion_row(criterion: dict[str, Any]) -> tuple[str, ...]:
         risk_text(criterion["probability"]) if has_budget else "–",
         "–" if spread is None else width_text(spread * scale),
         _text(criterion["background"], scale, quantity.decimals),
-        Result(criterion["verdict"], criterion["verdict"]),
+        criterion["verdict"],
     )
 
 
