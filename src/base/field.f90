@@ -1,6 +1,6 @@
 !> One key of the input: its name, unit, allowed range and meaning, and the variable that it sets. The input is read,
 !> checked, written and documented by this description. `in_group` sets the group and the owner of keys, `only_with` the
-!> choice that they need.
+!> key that switches them on.
 module thud_field
    use thud_error, only: error_type, input_error
    use thud_interval, only: get_range_text, interval_type, key_length, new_interval
@@ -64,8 +64,8 @@ module thud_field
       !> `derived` (at the value 0 it follows from other keys), or `calibrated` (on the standard ball: where the key is not
       !> stated, it has the value of the standard ball by the model).
       character(len=10) :: trait = ''
-      !> A choice and its values with which the key has an effect, the calibrated one first; blank: with all:
-      !> [max_choices].
+      !> What the key needs for an effect: another one that is neither 0 nor empty, or a choice and its values, the
+      !> calibrated one first; blank: nothing: [max_choices].
       character(len=key_length) :: needs(max_choices) = ''
       !> Number of allowed texts; 0 for free text.
       integer :: n_choice = 0
@@ -139,26 +139,27 @@ contains
       if (present(owner)) placed%owner = owner
    end function in_group
 
-   !> Keys that have an effect only with some values of a choice.
-   function only_with(choice, values, fields) result(needing)
-      !> Key of the choice.
-      character(len=*), intent(in) :: choice
-      !> Its values, the calibrated one first: [n_value].
-      character(len=*), intent(in) :: values(:)
+   !> Keys that have an effect only with another one, except keys that need one already.
+   function only_with(switch, fields, values) result(needing)
+      !> The other key.
+      character(len=*), intent(in) :: switch
       !> The keys: [n_field].
       type(field_type), intent(in) :: fields(:)
+      !> Its values, if it is a choice, the calibrated one first (default: any but 0 and an empty list): [n_value].
+      character(len=*), intent(in), optional :: values(:)
       type(field_type) :: needing(size(fields))
       integer :: i
 
       needing = fields
-      needing%needs(1) = choice
-      do i = 1, size(values)
-         needing%needs(i + 1) = values(i)
+      do i = 1, size(fields)
+         if (needing(i)%needs(1) /= '') cycle
+         needing(i)%needs(1) = switch
+         if (present(values)) needing(i)%needs(2:size(values) + 1) = values
       end do
    end function only_with
 
-   !> Whether a key has an effect with the choices of the case.
-   pure function has_effect(field, fields) result(yes)
+   !> Whether a key has an effect with the values of the other keys.
+   pure recursive function has_effect(field, fields) result(yes)
       class(field_type), intent(in) :: field
       !> Keys that the case uses: [n_field].
       type(field_type), intent(in) :: fields(:)
@@ -167,7 +168,10 @@ contains
 
       i = findloc(fields%owner == field%owner .and. fields%key == field%needs(1), .true., dim=1)
       yes = field%needs(1) == ''
-      if (i > 0) yes = any(field%needs(2:) == fields(i)%choices(nint(fields(i)%get_number())))
+      if (i == 0) return
+      yes = any(abs(fields(i)%get_entries()) > 0.0_wp)
+      if (field%needs(2) /= '') yes = any(field%needs(2:) == fields(i)%choices(nint(fields(i)%get_number())))
+      yes = yes .and. fields(i)%has_effect(fields)
    end function has_effect
 
    !> Returns an error for the first value outside its range, NaN included.

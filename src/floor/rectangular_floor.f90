@@ -2,7 +2,7 @@
 module thud_rectangular_floor
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type, list_type, name_length, new_field
+   use thud_field, only: field_type, list_type, name_length, new_field, only_with
    use thud_floor_model, only: floor_model_type, floor_state_type, third_bands
    use thud_floor_modes, only: get_floor_modes, mode_limit, new_floor_receiver
    use thud_kinds, only: wp
@@ -86,10 +86,11 @@ contains
 
       fields = [ &
          new_field('support', self%support, '', 'support of the edges', choices=supports), &
+         only_with('support', [ &
          new_field('support_stiffness', self%support_stiffness, 'N/m2', 'stiffness of elastic edges against ' &
          //'deflection per length: 1 value, or 4 (x at 0 and length, y at 0 and width)', '[0, 1e14]'), &
          new_field('support_rotation', self%support_rotation, 'N', &
-         'stiffness of elastic edges against rotation per length: 1 or 4 values', '[0, 1e14]'), &
+         'stiffness of elastic edges against rotation per length: 1 or 4 values', '[0, 1e14]')], ['elastic']), &
          new_field('line_x', self%line_x, 'm', 'positions along the length of walls or beams on which the floor rests', &
          '(0, 100)'), &
          new_field('line_y', self%line_y, 'm', 'positions along the width of walls or beams on which the floor rests', &
@@ -98,8 +99,8 @@ contains
          get_subceiling_fields(self%subceiling, on_joists), &
          new_field('covering_stiffness', self%covering_stiffness, 'N/m', &
          'stiffness of a covering under the source; 0: none', '[0, 1e12]'), &
-         new_field('covering_loss_factor', self%covering_loss_factor, '', 'loss factor of the covering at 50 Hz', &
-         '[0.01, 2]'), &
+         only_with('covering_stiffness', [new_field('covering_loss_factor', self%covering_loss_factor, '', &
+         'loss factor of the covering at 50 Hz', '[0.01, 2]')]), &
          new_field('covering_improvement', self%covering_improvement, 'dB', 'measured reduction of heavy impact sound ' &
          //'by a covering, in octaves 63 to 500 Hz or one-third octaves 50 to 630 Hz', '[-30, 60]')]
    end function get_build_up_fields

@@ -1,7 +1,7 @@
 !> A floating plate on a resilient layer, on any plate: its keys, and the power that it lets through.
 module thud_screed
    use thud_constants, only: pi
-   use thud_field, only: field_type, new_field
+   use thud_field, only: field_type, new_field, only_with
    use thud_kinds, only: wp
    use thud_plate, only: air_type, get_bending_stiffness, get_surface_mass, get_total_loss, plate_type
    implicit none (type, external)
@@ -28,13 +28,14 @@ contains
 
       fields = [ &
          new_field('screed_thickness', screed%thickness, 'm', 'thickness of a floating plate; 0: none', '[0, 0.5]'), &
+         only_with('screed_thickness', [ &
          new_field('screed_density', screed%density, 'kg/m3', 'density of the floating plate', '[10, 20000]'), &
          new_field('screed_wave_speed', screed%wave_speed, 'm/s', &
          'speed of longitudinal waves in the floating plate', '[100, 10000]'), &
          new_field('screed_loss_factor', screed%loss_factor, '', 'loss factor of the floating plate', '[0, 1]'), &
          new_field('layer_stiffness', screed%layer_stiffness, 'N/m3', &
          'dynamic stiffness of the resilient layer per unit area (ISO 9052-1)', '[1e4, 1e12]'), &
-         new_field('layer_loss_factor', screed%layer_loss_factor, '', 'loss factor of the resilient layer', '[0, 1]')]
+         new_field('layer_loss_factor', screed%layer_loss_factor, '', 'loss factor of the resilient layer', '[0, 1]')])]
    end function get_screed_fields
 
    !> The floating plate on another plate.

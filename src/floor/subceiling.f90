@@ -1,6 +1,6 @@
 !> A subceiling below any plate, on channels, battens or hangers, with the air between: its keys, and its plate.
 module thud_subceiling
-   use thud_field, only: field_type, new_field
+   use thud_field, only: field_type, new_field, only_with
    use thud_kinds, only: wp
    use thud_plate, only: plate_type
    implicit none (type, external)
@@ -31,6 +31,7 @@ contains
       fields = [ &
          new_field('subceiling_thickness', subceiling%thickness, 'm', 'thickness of a subceiling that radiates ' &
          //'instead of the floor; 0: none', '[0, 0.2]'), &
+         only_with('subceiling_thickness', [ &
          new_field('subceiling_density', subceiling%density, 'kg/m3', 'density of the subceiling', '[10, 20000]'), &
          new_field('subceiling_modulus', subceiling%modulus, 'Pa', 'modulus of elasticity of the subceiling in bending', &
          '[1e7, 1e12]'), &
@@ -42,10 +43,10 @@ contains
          new_field('cavity_depth', subceiling%cavity_depth, 'm', 'depth of the air between floor and subceiling', &
          '[0.005, 2]'), &
          new_field('cavity_loss_factor', subceiling%cavity_loss_factor, '', &
-         'loss factor of this air, high with absorber in it', '[0, 1]')]
-      if (.not. on_joists) fields = [fields, &
+         'loss factor of this air, high with absorber in it', '[0, 1]')])]
+      if (.not. on_joists) fields = [fields, only_with('subceiling_thickness', [ &
          new_field('channel_spacing', subceiling%channel_spacing, 'm', &
-         'distance of the lines that hold the subceiling, which run along the length', '[0.05, 100]')]
+         'distance of the lines that hold the subceiling, which run along the length', '[0.05, 100]')])]
    end function get_subceiling_fields
 
    !> The subceiling below another plate.

@@ -12,6 +12,7 @@ import pytest
 
 import thud
 from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS, RATINGS
+from thud.base.immutable import plain
 from thud.explorer.answer import answer_case, new_case
 from thud.explorer.form import form
 from thud.explorer.messages import describe_error
@@ -115,8 +116,41 @@ def test_keys_that_a_model_ignores_have_no_effect(model: str) -> None:
                 assert is_equal != is_used, name
 
 
+# Values that switch other keys on.
+SWITCHES: dict[str, Any] = {
+    "screed_thickness": 0.05, "subceiling_thickness": 0.0125, "covering_stiffness": 1e7,
+    "support": "elastic", "ceiling_mass": 10.0, "wall_lengths": (4.0,), "wall_junction": "index",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", [thud.Plate, thud.LaminateFloor, thud.JoistFloor, thud.Room])
+def test_keys_of_floor_and_room_have_an_effect_only_with_their_switch(kind: type[Any]) -> None:
+    impact = thud.solve(model="hollow_sphere")
+
+    def result(values: dict[str, Any]) -> list[float]:
+        if kind is thud.Room:
+            return list(thud.predict_level(impact, thud.Plate(), kind(**values)).level)
+        return list(thud.mobility(kind(**values), [20.0, 50.0, 100.0]).values)
+
+    off: dict[str, Any] = {}
+    before: dict[str, list[float]] = {}
+    for key in (key for key in kind.keys.values() if key.needs):
+        (switch, *_), default = key.needs, np.asarray(getattr(kind(), key.name) or [1e6])
+        on = {switch: SWITCHES[switch]}
+        if switch in {"wall_junction", "support"}:
+            on |= {"wall_lengths": (4.0,)} if kind is thud.Room else {"support_stiffness": 1e7}
+        value = plain(0.9 * default) if key.kind != "choice" else key.choices[1]
+        if switch != "support":
+            off[key.name] = value
+        assert not key.has_effect(kind())
+        assert key.has_effect(kind(**on))
+        expected = before.setdefault(str(on), result(on))
+        assert result(on | {key.name: value}) != expected, key.name
+    assert result(off) == result({})
+
+
 def test_keys_of_conditions_have_no_effect_without_their_choice() -> None:
-    for key in (key for key in KEYS if key.needs):
+    for key in (key for key in KEYS if key.needs and key.owner in MODELS):
         owner, (other, *choices) = key.owner, key.needs
         (switch,) = (entry for entry in KEYS if entry.owner == owner and entry.name == other)
         assert set(choices) <= set(switch.choices)

@@ -43,8 +43,8 @@ class Key:
     whole: bool = False
     lower_open: bool = False
     upper_open: bool = False
-    # Name of a choice and its values with which the key has an effect, that of the standard ball
-    # first; empty: with all.
+    # What the key needs for an effect: the name of another one that is neither 0 nor empty, or of a
+    # choice and its values, that of the standard ball first; empty: nothing.
     needs: tuple[str, ...] = ()
 
     @property
@@ -59,6 +59,14 @@ class Key:
         signs = ["<" if is_open else "<=" for is_open in (self.lower_open, self.upper_open)]
         whole = ", whole" if self.whole or self.kind == "whole" else ""
         return f"{low} {signs[0]} {self.name} {signs[1]} {high} {self.unit}".rstrip() + whole
+
+    def has_effect(self, group: Group) -> bool:
+        """Whether the key has an effect with the values of the other keys of its group."""
+        if not self.needs:
+            return True
+        switch, *values = self.needs
+        value = getattr(group, switch)
+        return (value in values if values else bool(value)) and group.keys[switch].has_effect(group)
 
     def require(self, value: object, *, of_file: bool = True) -> None:
         """Raise InputError if a value is not allowed, whatever the values of other keys are.

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from thud.base._schema import (
-    KEYS,
     RATED_BANDS,
     MeasuredMobility,
     ModalFloor,
@@ -39,16 +38,6 @@ if TYPE_CHECKING:
     Cells = tuple[str | float, ...]
 
 
-# Beginnings of the names of keys without effect if another key has a value.
-_WITHOUT_EFFECT: dict[tuple[str, object], tuple[str, ...]] = {
-    ("screed_thickness", 0.0): ("screed_", "layer_stiffness", "layer_loss_factor"),
-    ("subceiling_thickness", 0.0): ("subceiling_", "channel_", "cavity_"),
-    ("covering_stiffness", 0.0): ("covering_",),
-    ("ceiling_mass", 0.0): ("ceiling_",),
-    ("wall_lengths", ()): ("wall_", "junction_"),
-    ("wall_junction", "cross"): ("junction_",),
-    ("wall_junction", "t"): ("junction_",),
-}
 # Keys that are listed even if they have their default value.
 _MAIN = (
     "length", "width", "thickness", "sheathing_thickness", "joist_height", "density",
@@ -163,8 +152,8 @@ class PredictedFloor:
         floor, room, construction = self.prediction.floor, self.prediction.room, self.construction
         sources = construction.sources if construction else {}
         ceiling = {key: sources[key] for key in construction.room} if construction else {}
-        for group, owner, known in ((floor, floor.name, sources), (room, "room", ceiling)):
-            for key, value, is_default in _effective_values(group, owner):
+        for group, known in ((floor, sources), (room, ceiling)):
+            for key, value, is_default in _effective_values(group):
                 default = "default value" if key.name in _MAIN else ""
                 source = known.get(key.name, default if is_default else "stated in the case")
                 # The construction takes the sides of the case.
@@ -301,22 +290,14 @@ def octave_titles() -> list[str]:
     return [f"{frequency:g} Hz, dB" for frequency in RATED_BANDS["octave"]]
 
 
-def _effective_values(group: FloorOptions | Room, owner: str) -> Iterator[tuple[Key, object, bool]]:
+def _effective_values(group: FloorOptions | Room) -> Iterator[tuple[Key, object, bool]]:
     """Yield the keys of a group that have an effect, their values, and whether by default."""
-    off = [
-        prefix
-        for (switch, value), prefixes in _WITHOUT_EFFECT.items()
-        if getattr(group, switch, None) == value
-        for prefix in prefixes
-    ]
-    for key in KEYS:
-        if key.owner != owner or not hasattr(group, key.name):
-            continue
+    for key in group.keys.values():
         value = getattr(group, key.name)
         is_default = value == getattr(type(group)(), key.name)
-        if key.name.startswith(("point_", *_REQUIRED, *off)) or (is_default and value in (0.0, ())):
-            continue
-        yield key, value, is_default
+        is_shown = key.has_effect(group) and not key.name.startswith(("point_", *_REQUIRED))
+        if is_shown and not (is_default and value in (0.0, ())):
+            yield key, value, is_default
 
 
 def _value_text(key: Key, value: object) -> str:

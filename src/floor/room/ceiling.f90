@@ -1,7 +1,7 @@
 !> A light ceiling without rigid connection to the floor: its mass on the cavity's stiffness, and the sound in the cavity.
 module thud_ceiling
    use thud_constants, only: pi
-   use thud_field, only: field_type, new_field
+   use thud_field, only: field_type, new_field, only_with
    use thud_kinds, only: wp
    use thud_plate, only: air_type
    implicit none (type, external)
@@ -31,8 +31,9 @@ contains
       fields = [ &
          new_field('ceiling_mass', ceiling%mass, 'kg/m2', 'mass per unit area of a suspended ceiling; 0: none', &
          '[0, 200]'), &
+         only_with('ceiling_mass', [ &
          new_field('ceiling_depth', ceiling%depth, 'm', 'depth of the air cavity above the ceiling', '[0.01, 2]'), &
-         new_field('ceiling_loss_factor', ceiling%loss_factor, '', 'loss factor of the ceiling cavity', '[0.001, 1]')]
+         new_field('ceiling_loss_factor', ceiling%loss_factor, '', 'loss factor of the ceiling cavity', '[0.001, 1]')])]
    end function get_ceiling_fields
 
    !> Ratio of the squared velocity of the ceiling to that of the floor, averaged over a band. The floor drives the ceiling

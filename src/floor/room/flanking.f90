@@ -2,7 +2,7 @@
 module thud_flanking
    use thud_constants, only: pi
    use thud_error, only: error_type, input_error
-   use thud_field, only: field_type, list_type, name_length, new_field
+   use thud_field, only: field_type, list_type, name_length, new_field, only_with
    use thud_kinds, only: wp
    use thud_plate, only: air_type, get_critical_frequency, get_surface_mass, plate_type
    use thud_text, only: to_text
@@ -50,6 +50,7 @@ contains
       fields = [ &
          new_field('wall_lengths', walls%lengths, 'm', &
          'lengths of the flanking walls along the floor (default: no walls)', '[0.1, 100]'), &
+         only_with('wall_lengths', [ &
          new_field('wall_height', walls%height, 'm', 'height of the walls', '[0.5, 20]'), &
          new_field('wall_thickness', walls%thickness, 'm', 'thickness of the walls: one, or one for each of ' &
          //'wall_lengths', '[0.005, 2]'), &
@@ -61,9 +62,9 @@ contains
          'internal loss factor of the walls: one, or one for each', '[0, 1]'), &
          new_field('wall_junction', walls%junction, '', &
          'junction of floor and walls: rigid cross or T, or described by junction_index', choices=junctions), &
-         new_field('junction_index', walls%index, 'dB', &
+         only_with('wall_junction', [new_field('junction_index', walls%index, 'dB', &
          'vibration reduction index from floor to wall, for wall_junction index: one, or one for each wall', &
-         '[-10, 80]')]
+         '[-10, 80]')], junctions(3:))])]
    end function get_wall_fields
 
    !> Checks the numbers of values of the walls.

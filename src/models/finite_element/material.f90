@@ -68,23 +68,23 @@ contains
       fields = [ &
          new_field('law', options%law, '', 'law of elasticity', &
          choices=[character(len=16) :: 'neo_hookean', 'mooney_rivlin']), &
-         only_with('law', ['mooney_rivlin'], [new_field('mooney_share', options%mooney_share, '', &
-         'second-invariant fraction of the shear modulus, for mooney_rivlin', '[0, 1]')]), &
+         only_with('law', [new_field('mooney_share', options%mooney_share, '', &
+         'second-invariant fraction of the shear modulus, for mooney_rivlin', '[0, 1]')], ['mooney_rivlin']), &
          new_field('bulk_ratio', options%bulk_ratio, '', &
          "maximum ratio of bulk to shear modulus; lower if Poisson's ratio implies a lower one", '[2, 100000]'), &
          new_field('viscosity', options%viscosity, '', 'law of viscosity', &
          choices=[character(len=16) :: 'none', 'kelvin_voigt', 'fractional', 'constant_loss', 'prony']), &
-         only_with('viscosity', lossy(:3), [ &
+         only_with('viscosity', [ &
          new_field('loss_factor', options%loss_factor, '', 'loss factor: at loss_frequency (kelvin_voigt, ' &
-         //'fractional), or from 10 to 1000 Hz (constant_loss)', '(0, 1]', trait='calibrated')]), &
-         only_with('viscosity', lossy, [new_field('loss_frequency', options%loss_frequency, 'Hz', &
-         "frequency at which the ball's modulus is the storage modulus", '[1, 10000]', trait='calibrated')]), &
-         only_with('viscosity', lossy(:1), [new_field('fractional_order', options%fractional_order, '', &
-         'order of the derivative, for fractional; 1: as kelvin_voigt', '(0, 1]', trait='calibrated')]), &
-         only_with('viscosity', lossy(4:), [new_field('prony_share', options%prony_share, '', &
+         //'fractional), or from 10 to 1000 Hz (constant_loss)', '(0, 1]', trait='calibrated')], lossy(:3)), &
+         only_with('viscosity', [new_field('loss_frequency', options%loss_frequency, 'Hz', &
+         "frequency at which the ball's modulus is the storage modulus", '[1, 10000]', trait='calibrated')], lossy), &
+         only_with('viscosity', [new_field('fractional_order', options%fractional_order, '', &
+         'order of the derivative, for fractional; 1: as kelvin_voigt', '(0, 1]', trait='calibrated')], lossy(:1)), &
+         only_with('viscosity', [new_field('prony_share', options%prony_share, '', &
          'moduli of the branches divided by the long-term modulus, for prony', '[0, 1000]'), &
          new_field('prony_time', options%prony_time, 's', 'relaxation times of the branches, for prony', &
-         '(0, 1000]')])]
+         '(0, 1000]')], lossy(4:))]
    end function get_material_fields
 
    !> Returns an error if options do not fit each other, or if the model cannot take the ball.

@@ -110,6 +110,8 @@ contains
    function get_fields(self) result(fields)
       class(modal_ball_type), intent(in), target :: self
       type(field_type), allocatable :: fields(:)
+      ! Laws with a loss factor, the calibrated one first; those with a frequency; that of an order.
+      character(len=*), parameter :: laws(3) = [character(len=10) :: 'rising', 'fractional', 'constant']
 
       fields = [ &
          new_field('highest_frequency', self%highest_frequency, 'Hz', &
@@ -119,13 +121,13 @@ contains
          'number of rings on the surface, from the lowest point to 60 degrees; 0: automatic', '[0, 400]'), &
          new_field('damping_law', self%damping_law, '', 'damping law: loss factor as a function of frequency', &
          choices=[character(len=10) :: 'constant', 'rising', 'fractional']), &
-         only_with('damping_law', ['rising    ', 'fractional', 'constant  '], [new_field('loss_factor', &
-         self%loss_factor, '', 'loss factor, twice the damping ratio', '[0, 1.9]', trait='calibrated')]), &
-         only_with('damping_law', ['rising    ', 'fractional'], [new_field('loss_frequency', self%loss_frequency, 'Hz', &
+         only_with('damping_law', [new_field('loss_factor', self%loss_factor, '', &
+         'loss factor, twice the damping ratio', '[0, 1.9]', trait='calibrated')], laws), &
+         only_with('damping_law', [new_field('loss_frequency', self%loss_frequency, 'Hz', &
          'frequency at which loss_factor (rising, fractional) and the modulus (fractional) apply', '[0.1, 100000]', &
-         trait='calibrated')]), &
-         only_with('damping_law', ['fractional'], [new_field('fractional_order', self%fractional_order, '', &
-         'order of the derivative, for fractional; 1: as rising', '(0, 1]')]), &
+         trait='calibrated')], laws(:2)), &
+         only_with('damping_law', [new_field('fractional_order', self%fractional_order, '', &
+         'order of the derivative, for fractional; 1: as rising', '(0, 1]')], laws(2:2)), &
          new_field('cavity_gas', self%cavity_gas, '', 'the gas in the cavity resists volume changes'), &
          new_field('contact_gravity', self%contact_gravity, '', 'gravity acts also during the contact'), &
          new_field('floor_friction', self%floor_friction, '', 'friction of the floor: none or infinite (sticking)', &

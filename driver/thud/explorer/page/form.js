@@ -36,7 +36,7 @@ export function findField(group, name) {
   return allFields().find((field) => field.group === group && field.name === name);
 }
 
-/** Return the field on whose choice a field depends, if there is one. */
+/** Return the field that switches a field on, if there is one. */
 function switchOf(field) {
   const { fields } = about.form.find((group) => group.fields.includes(field));
   return fields.find(({ name }) => name === field.condition[0]);
@@ -45,8 +45,10 @@ function switchOf(field) {
 /** Return whether a field has an effect on the case. */
 function isUsed(field) {
   const owner = switchOf(field);
+  const choices = field.condition.slice(1);
+  const isOn = (value) => (choices.length ? choices.includes(value) : [value].flat().some(Boolean));
   return field.models?.includes(state.model) !== false
-    && (!owner || field.condition.includes(valueOf(owner), 1));
+    && (!owner || (isOn(valueOf(owner)) && isUsed(owner)));
 }
 
 const isSame = (one, other) => JSON.stringify(one) === JSON.stringify(other);
@@ -166,12 +168,15 @@ function fillConstruction(name) {
  * `onTyping` while one is typed, `onInvalid` if it is no value, `onPress` with a press curve. */
 export function buildInputs(handlers) {
   const { onChange } = handlers;
-  const focus = document.activeElement?.id;
+  const { id: focus, selectionStart: caret } = document.activeElement;
   const scroll = byId("inputs").scrollTop;
   const all = { ...handlers, rebuild: () => { buildInputs(handlers); onChange(); } };
   replaceInputs(state.door === "floor" ? floorInputs(all) : ballInputs(all));
   byId("inputs").scrollTop = scroll;
-  if (focus && document.activeElement?.id !== focus) byId(focus)?.focus();
+  if (!focus || document.activeElement.id === focus) return;
+  byId(focus)?.focus();
+  // A text that is being typed goes on.
+  if (caret != null) byId(focus)?.setSelectionRange(caret, caret);
 }
 
 /** Replace the form but for a choice that has the focus: typing its name goes on. */
@@ -291,10 +296,14 @@ function foldedElement(groups, handlers, sources) {
 function fieldElement(field, handlers, source) {
   const id = `${field.group}.${field.name}`;
   const onInput = (value) => {
-    const changesFields = allFields().some((other) => switchOf(other) === field);
+    const used = () => allFields().map(isUsed).join();
+    const before = used();
     setValue(field, value);
-    if (changesFields) handlers.rebuild();
-    else handlers.onChange();
+    const { activeElement } = document;
+    if (used() === before) handlers.onChange();
+    else if (activeElement.type !== "range") handlers.rebuild();
+    // A slider is dragged to its end first.
+    else activeElement.addEventListener("change", handlers.rebuild, { once: true });
     showChoices();
   };
   const { kind, label, unit, help } = field;
@@ -435,13 +444,15 @@ function numberInput(field, id, onInput, handlers) {
 const rounding = (count, step) => scaled(Math.round(count), Math.round(Math.log10(step)));
 
 /** Return a slider of round values; `onMove` is called with the selected value. */
-function sliderInput({ slider: { ends }, step, lower, upper, label, unit }, value, onMove) {
+function sliderInput(field, value, onMove) {
+  const { group, name, slider: { ends }, step, lower, upper, label, unit } = field;
   // A model or a construction may have brought a value near the end for the default.
   const low = Math.min(ends[0], Math.max(value / 2, lower ?? 0));
   const high = Math.max(ends[1], Math.min(2 * value, upper ?? Infinity));
   const min = rounding(Math.ceil(low / step - 1e-6), step);
   const max = rounding(Math.floor(high / step + 1e-6), step);
-  const slider = element("input", { type: "range", "aria-label": label, min, max, step });
+  const id = `${group}.${name}.slider`;
+  const slider = element("input", { id, type: "range", "aria-label": label, min, max, step });
   slider.moveTo = (selected) => {
     slider.value = selected;
     slider.setAttribute("aria-valuetext", `${selected} ${unit}`.trim());
