@@ -110,7 +110,6 @@ def test_bad_usage_is_told(arguments: list[str], errors_of: ErrorsOf) -> None:
         (["history", "a.csv"], ("a.csv", "recording", "report")),
         (["rate", "a.nml"], ("a.nml", "case", "table of levels")),
         (["explore", "a.wav"], ("a.wav", "recording", "measure")),
-        (["surrogate", "a.npz"], ("a.npz", "surrogate", "TOML file", "[surrogate] file")),
         *(([name, "a.nml"], ("a.nml", "TOML file", "run")) for name in ("fit", "sweep", "design")),
         (["x.wav"], ("x.wav", "recording", "measure")),
         (["study.toml", "-q"], ("study.toml", "TOML file", "sweep")),

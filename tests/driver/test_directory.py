@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 from conftest import names_in, naming
+from hypothesis import given, settings, strategies as st
 
 import thud
 from thud import cli
@@ -273,3 +274,19 @@ def test_blocks_of_another_version_are_never_joined(
             thud.sweep(HEIGHTS, tmp_path)
     found = thud.sweep(HEIGHTS, tmp_path).dataset
     assert values(found).identical(values(thud.sweep(HEIGHTS).dataset))
+
+
+@given(position=st.integers(0, 30_000), bit=st.integers(0, 7))
+@settings(max_examples=50, deadline=None)
+def test_flipped_bits_are_found(
+    position: int, bit: int, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "flipped.nc"
+    if not path.exists():
+        thud.sweep(HEIGHTS).save(path)
+    content = bytearray(path.read_bytes())
+    content[position % len(content)] ^= 1 << bit
+    damaged = path.with_stem("damaged")
+    damaged.write_bytes(content)
+    with pytest.raises(thud.InputError, match=naming("damaged.nc")):
+        thud.read_sweep(damaged)

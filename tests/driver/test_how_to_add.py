@@ -41,7 +41,9 @@ assert abs(many.mid_peak[1] / impact.mid_peak - 1) < 1e-9, (many.mid_peak, impac
 assert "peak, 63 to 250 Hz, N" in dict(row[:2] for row in many.rows())
 study = {"parameters": {"height": {"values": [0.8, 1.0]}}}
 assert np.allclose(thud.sweep(study).dataset["mid_peak"], many.mid_peak)
-learned = thud.surrogate({"parameters": {"height": {"low": 0.9, "high": 1.0}}})
+learned = thud.surrogate(
+    {"design": {"size": 64}, "parameters": {"height": {"low": 0.9, "high": 1.0}}}
+)
 assert "mid_peak" in learned.outputs, learned.outputs
 target = thud.LevelTarget(
     impact.levels(), 0.2, quantities={"mid_peak": (impact.mid_peak, 1.0)}

@@ -92,7 +92,7 @@ def test_plots_of_a_surrogate_are_legible() -> None:
         "wall_thickness": {"low": 29, "high": 32, "unit": "mm"},
         "youngs_modulus": {"low": 1.6, "high": 2.0, "unit": "MPa"},
     }
-    trained = thud.surrogate({**study, "parameters": ranges})
+    trained = thud.surrogate({**study, "design": {"size": 64}, "parameters": ranges})
     assert find_faults(draw_surrogate(trained)) == []
     axes = {name: {**limits, "count": 41} for name, limits in ranges.items()}
     found = thud.design({**study, "parameters": axes}, surrogate=trained)

@@ -144,11 +144,11 @@ def test_studies_vary_floors_and_rooms(tmp_path: Path, many: thud.Ensemble) -> N
 def test_surrogates_refuse_floors(tmp_path: Path) -> None:
     path = tmp_path / "case.nml"
     path.write_text(TEXT, encoding="utf-8")
-    ends = {"low": 0.5, "high": 1.0}
+    ends, size = {"low": 0.5, "high": 1.0}, {"size": 64}
     with pytest.raises(thud.InputError, match=naming("surrogate", "floor")):
-        thud.surrogate({"case": str(path), "parameters": {"height": ends}})
+        thud.surrogate({"case": str(path), "design": size, "parameters": {"height": ends}})
     fixed = {"model": "hunt_crossley", "contact_time": 0.02, "restitution": 0.8}
-    trained = thud.surrogate({"fixed": fixed, "parameters": {"height": ends}})
+    trained = thud.surrogate({"fixed": fixed, "design": size, "parameters": {"height": ends}})
     study = {"case": str(path), "fixed": fixed, "parameters": {"height": {**ends, "count": 3}}}
     with pytest.raises(thud.InputError, match=naming("surrogate", "floor")):
         thud.sweep(study, surrogate=trained)

@@ -94,8 +94,8 @@ def slow_calls(folder: Path) -> Calls:
     np.savetxt(folder / "record.csv", np.c_[np.arange(force.size) / impact.sample_rate, force])
     table = thud.Mobility([20.0, 30.0, 40.0, 50.0], [1e-5, 2e-5, 2e-5, 1e-5])
     set_study: Any = {"design": {"size": 8}, "parameters": MASS}
-    learned = thud.surrogate({"parameters": MASS, "surrogate": {"size": 64}})
-    learned.save(folder / "mass.npz")
+    learned = thud.surrogate({"design": {"size": 64}, "parameters": MASS})
+    learned.save(folder / "mass.nc")
     thud.sweep({"name": "kept", "parameters": HEIGHTS}, folder)
     results = folder / "results"
     _run(folder, results)
@@ -133,8 +133,8 @@ def slow_calls(folder: Path) -> Calls:
         "uncertainty": lambda: str(thud.uncertainty(set_study).rows()),
         "sensitivity": lambda: str(thud.sensitivity(set_study).rows()),
         "design": lambda: str(thud.design({"parameters": _plane()}).rows()),
-        "surrogate": lambda: str(thud.surrogate({"parameters": MASS})),
-        "read_surrogate": lambda: str(thud.read_surrogate(folder / "mass.npz")),
+        "surrogate": lambda: str(thud.surrogate({"design": {"size": 64}, "parameters": MASS})),
+        "read_surrogate": lambda: str(thud.read_surrogate(folder / "mass.nc")),
         "plot": saved,
         "to_xarray": lambda: impact.to_xarray().floor_force,
         "to_dataframe": lambda: impact.to_dataframe().to_numpy(),

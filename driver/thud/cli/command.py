@@ -85,7 +85,6 @@ FILE_KINDS: dict[str, tuple[tuple[str, ...], str]] = {
                   "measure, calibrate, compare or export"),
     "calibration report": ((".json",), "history"),
     "table of levels": ((".xlsx",), "rate"),
-    "surrogate": ((".npz",), "sweep, sensitivity, design or uncertainty ([surrogate] file)"),
     "directory": ((), "explore or history"),
 }  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""The commands that read study files: one for each kind of study, fits and surrogates."""
+"""The commands that read study files: one for each kind of study, and fits."""
 
 from __future__ import annotations
 
@@ -8,14 +8,12 @@ from typing import TYPE_CHECKING
 
 from thud.base.errors import NumericalError, ThudError
 from thud.base.files import replace_file
-from thud.base.tables import format_rows
 from thud.cli.command import (
     NO_FIGURES,
     QUIET,
     command,
     figures_of,
     files,
-    finish,
     flag,
     option,
     output,
@@ -82,31 +80,6 @@ for _name, _kind in KINDS.items():
         NO_FIGURES,
         QUIET,
     )(run_study)
-
-
-@command(
-    "surrogate",
-    "train a fast approximation of a slow model for other studies",
-    _STUDY,
-    *output("the surrogate; a training goes on there (default: outputs/<study name>)"),
-    _WORKERS,
-    NO_FIGURES,
-    QUIET,
-)
-def train(options: argparse.Namespace) -> int:
-    """Train a surrogate, print its errors and save them as a figure; return the exit code."""
-    from thud.studies.surrogate import read_training, surrogate
-
-    training = read_training(options.study)
-    folder = Path(options.output or Path("outputs", training.name))
-    trained = surrogate(
-        training, folder, workers=options.workers, replace=options.replace,
-        progress=shows_progress(quiet=options.quiet),
-    )  # fmt: skip
-    contents = {training.file: trained.to_bytes()}
-    contents |= figures_of(options, {training.name: trained.plot})
-    results = training.results(folder, replace=options.replace)
-    return finish(options, results, contents, format_rows(trained.rows()), trained.notes)
 
 
 @command(

@@ -24,7 +24,7 @@ from thud.base.immutable import freeze
 from thud.case.case import Case, case_text, impact_only, new_model
 from thud.case.keys import find_key
 from thud.impact.datasets import NO_ERRORS, RESULTS, ensemble_dataset, sample_warnings
-from thud.level.levels import FORCES
+from thud.level.levels import FORCES, peak_count
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -120,6 +120,17 @@ class Ensemble(SampleQuantities, Displayed):
         is_assessed = np.isfinite(self.margin).any() or (self.status != 0).all()
         verdict = f"{self.conforms.sum()} conform" if is_assessed else "not assessed"
         return f"<Ensemble: {len(self)} drops by {names}; {verdict}{failed}>"
+
+    @property
+    def peaks(self) -> NDArray[np.float64] | None:
+        """Number of peaks of the assessed force; NaN without result, None without forces."""
+        if (forces := getattr(self, f"{self.case.levels.force}_force")) is None:
+            return None
+        counts = [
+            math.nan if status else peak_count(force, self.sample_rate)
+            for force, status in zip(forces, self.status, strict=True)
+        ]
+        return np.array(counts, dtype=float)
 
     @property
     def results(self) -> dict[str, NDArray[Any]]:

@@ -235,7 +235,7 @@ def draw_sensitivity(result: Sensitivity) -> Figure:
 
 @own_style()
 def draw_surrogate(result: Surrogate) -> Figure:
-    """Draw the error of each assessed quantity in held-out drops, dB, and the bound.
+    """Draw the error of each assessed quantity in held-out drops, dB.
 
     The error of a quantity that is not a level is 20 lg of the ratio to the result of the model.
     """
@@ -244,8 +244,6 @@ def draw_surrogate(result: Surrogate) -> Figure:
     ]
     residuals = result.residuals[:, result.assessed]
     figure, axes = empty_axes(0.9 + 0.2 * len(labels))
-    bound = result.bound
-    axes.axvspan(-bound, bound, color="0.85", linewidth=0, label=f"Bound of 95 %, {bound:g} dB")
     position = np.arange(len(labels), dtype=float)
     for i, values in enumerate(residuals.T):
         axes.plot(

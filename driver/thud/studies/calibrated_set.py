@@ -19,7 +19,6 @@ from thud.impact.compute import compute
 from thud.impact.ensemble import solve_many
 from thud.impact.impact import Impact
 from thud.level.assessment import Verdict, assess_levels
-from thud.level.levels import peak_count
 from thud.studies.sampling import unit_samples
 from thud.studies.unknowns import blocked_case, stated_unknowns
 
@@ -176,15 +175,11 @@ def _criteria(case: Case, columns: Columns, *, progress: bool) -> Array:
             f"{failed.sum()} of {failed.size} drops have no result ({drops.reason[failed][0]})",
             "a source, and ranges of &unknowns, whose drops have results",
         )
-    force = case.levels.force
-    peaks = [
-        np.nan if lost else peak_count(history, drops.sample_rate)
-        for history, lost in zip(getattr(drops, f"{force}_force"), failed, strict=True)
-    ]
     others = [columns.get(key, value_in(case, key)) for key in ("mass", "height")]
     fixed = [np.broadcast_to(np.asarray(other, dtype=float), failed.size) for other in others]
-    levels = getattr(drops, f"{force}_octave")
-    return np.column_stack([levels, drops.contact_time, drops.restitution, peaks, *fixed])
+    levels = getattr(drops, f"{case.levels.force}_octave")
+    numbers = levels, drops.contact_time, drops.restitution, np.asarray(drops.peaks)
+    return np.column_stack([*numbers, *fixed])
 
 
 def _verdict(

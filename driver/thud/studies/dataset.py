@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from hashlib import sha256
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
@@ -47,6 +48,7 @@ def new_dataset(
             "shown_unit": shown_unit,
             "shown_exponent": -power,
             "scale": parameter.scale,
+            **({} if parameter.low is None else {"range": (parameter.low, parameter.high)}),
         }
         values = _objects(columns[parameter.name])
         coordinates[parameter.coordinate_name] = ("sample", values, attrs)
@@ -113,8 +115,9 @@ def _objects(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def write_dataset(dataset: xr.Dataset, path: Path) -> None:
-    """Write a NetCDF file atomically."""
-    replace_file(path, bytes(dataset.to_netcdf(engine="h5netcdf")))
+    """Write a NetCDF file atomically, with a checksum after its end, which other readers ignore."""
+    content = bytes(dataset.to_netcdf(engine="h5netcdf"))
+    replace_file(path, content + sha256(content).digest())
 
 
 def read_dataset(path: Path) -> xr.Dataset:
@@ -124,16 +127,17 @@ def read_dataset(path: Path) -> xr.Dataset:
         if not blocks:
             refuse(f"{path} holds no finished samples", "results of a study")
         return concatenate([read_dataset(block) for block in blocks])
+    content = b""
     try:
-        content = BytesIO(read_input(path))
-        with xr.open_dataset(content, engine="h5netcdf", phony_dims="access") as file:
-            dataset = file.load()
-    except (OSError, ValueError, KeyError, RuntimeError) as error:
+        content = read_input(path)
+    except (OSError, ValueError) as error:
         if is_failure(error):
             raise
-        refuse(
-            f"{path} cannot be read", "the .nc or .partial of a study; remove a damaged one", error
-        )
+    end = len(content) - sha256().digest_size
+    if sha256(content[:end]).digest() != content[end:]:
+        refuse(f"{path} cannot be read", "the .nc or .partial of a study; remove a damaged one")
+    with xr.open_dataset(BytesIO(content), engine="h5netcdf") as file:
+        dataset = file.load()
     variables = dataset.variables.items()
     texts: dict[Any, Any] = {n: v.astype(object) for n, v in variables if v.dtype.kind == "U"}
     return dataset.assign(texts).drop_encoding()

@@ -30,6 +30,7 @@ KINDS = {
     ),
     "design": Kind("which geometries and materials conform to the standards", ("grid",)),
     "uncertainty": Kind("effect of tolerances on levels and conformity", ("random",)),
+    "surrogate": Kind("train a fast approximation of a slow model for other studies", ("sobol",)),
 }
 
 

@@ -243,8 +243,7 @@ def _compute(
         while True:
             for start in islice(waiting, limit - len(running)):
                 columns = study.parameter_columns(start, _stop(study, start))
-                block = study.case, study.key_columns(columns), version(), study.surrogate
-                running[_submit(executor, *block)] = start
+                running[_submit(executor, study, study.key_columns(columns), version())] = start
             if not running:
                 return
             done, _ = wait(running, return_when=FIRST_COMPLETED)
@@ -278,23 +277,23 @@ def _submit(executor: Executor, *block: Any) -> Future[Columns]:  # noqa: ANN401
         return lost
 
 
-def evaluate(
-    case: Case, columns: Columns, required: str, surrogate: Surrogate | None = None
-) -> Columns:
+def evaluate(study: Study, columns: Columns, required: str) -> Columns:
     """Return the results of samples by names as in `RESULTS`; NaN for a failed sample.
 
-    `columns` are the values, shape (n_sample,), of the keys in which samples differ from the case;
-    a surrogate replaces the model if there is one. Raise InputError if this is not the required
-    version of thud, that of the process which submits the samples.
+    `columns` are the values, shape (n_sample,), of the keys in which samples differ from the case
+    of the study. Raise InputError if this is not the required version of thud, that of the process
+    which submits the samples.
     """
     if required != version():
         refuse(
             f"thud {version()} cannot compute samples of thud {required}",
             "the same version everywhere",
         )
-    if surrogate:
-        return surrogate.predict(case, columns)
-    results = solve_many(columns, case, threads=1).results
+    if study.surrogate:
+        return study.surrogate.predict(study.case, columns)
+    # The number of peaks, which a surrogate must know, follows from the forces.
+    forces = study.kind == "surrogate"
+    results = solve_many(columns, study.case, threads=1, forces=forces).results
     results["status"] = results["status"].astype("int8")
     return results
 

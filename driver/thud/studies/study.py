@@ -120,7 +120,9 @@ class Study:
             return _SURROGATE_BLOCK_SIZE
         if self.model == "finite_element":
             return _ELEMENT_BLOCK_SIZE
-        is_batch = not self.case.floor and self.case.levels.method == "exact"
+        is_exact = self.case.levels.method == "exact"
+        # Samples of surrogates have forces.
+        is_batch = is_exact and not self.case.floor and self.kind != "surrogate"
         return _BATCH_BLOCK_SIZE if self.model == "hollow_sphere" and is_batch else _BLOCK_SIZE
 
     @property
@@ -211,13 +213,10 @@ def read_study(source: Source, kind: str = "sweep", case: Case | None = None) ->
         if TEMPERATURE.name in {*content, *(parameter.name for parameter in study.parameters)}:
             law = read_temperature(content.get("temperature"), study.case, study.parameters)
             study = replace(study, temperature=law)
-        if "surrogate" in content:
-            table = table_of(content, "surrogate")
-            refuse_unknown("[surrogate]", table, ("file",))
-            path = table.get("file")
+        if (path := content.get("surrogate")) is not None:
             if not isinstance(path, str) or not path.strip():
-                refuse_value("[surrogate] file", path, "the path of a trained surrogate")
-            study = with_surrogate(study, read_surrogate(folder / path))
+                refuse_value("surrogate", path, "the path of the results of a surrogate")
+            study = with_surrogate(study, folder / path)
         return study
 
 

@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-import io
-import json
 import math
-from dataclasses import dataclass
+import warnings
+from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
+from scipy.linalg import cho_solve
 from scipy.spatial.distance import cdist
 from threadpoolctl import threadpool_limits
 
-from thud.base._schema import LIMITS
+from thud.base._schema import KEYS, LIMITS, SAMPLE_QUANTITIES
 from thud.base.bridge import version
-from thud.base.checks import refuse, require_kind
-from thud.base.display import Displayed
-from thud.base.extras import data_frame
-from thud.base.files import is_failure, read_input, replace_file
-from thud.case.case import Case, case_text, impact_only
+from thud.base.checks import refuse, refuse_value, require_kind
+from thud.base.extras import data_frame, require_extra
+from thud.case.case import Case, impact_only
 from thud.case.keys import OUTPUT_GROUP, value_in, with_values
 from thud.impact.datasets import FREQUENCIES, LEVELS, RESULTS
+from thud.studies.dataset import read_dataset
+from thud.studies.study_result import SampleResult
 
 if TYPE_CHECKING:
     import os
@@ -35,21 +35,28 @@ if TYPE_CHECKING:
 
     from thud.base._schema import LimitsSource
     from thud.studies.arrays import Array, Columns
+    from thud.studies.study import Study
 
 
 # Fraction of held-out drops within the stated error, and the confidence of that statement.
 COVERAGE = 0.95
+# Fewer drops have no order statistic that bounds 95 % of all with a confidence of 95 %.
+MIN_DROPS = 64
+# The time of the training grows with the third power of the number of drops.
+MAX_DROPS = 8192
 # Samples that are predicted together: their kernel stays in the cache.
 _CHUNK_SIZE = 250
-# Array this fraction of the width outside the region are rounding errors.
+# Values this fraction of the width outside the region are rounding errors.
 _ROUNDING = 1e-9
+# Variations below this fraction of the mean are rounding errors.
+_CONSTANT = 1e-10
 # Smoothness of the Matern kernel: functions that are twice differentiable (see `matern`).
 SMOOTHNESS = 2.5
-_ARRAYS = "region", "points", "drops", "length", "weights", "residuals"
+_GROUPS_OF_RECORDS = ("sampling", "levels", "limits")
 
 
-@dataclass(frozen=True, eq=False)
-class Surrogate(Displayed):
+@dataclass(frozen=True, eq=False, repr=False)
+class Surrogate(SampleResult):
     """Prediction of drops of a model from training drops in the same region.
 
     A Gaussian process interpolates all quantities, in dB: levels, and 20 lg of other quantities.
@@ -58,6 +65,8 @@ class Surrogate(Displayed):
 
     Attributes
     ----------
+    dataset : Dataset
+        The training drops, from which all other attributes follow.
     case : Case
         The case of the drops.
     keys : tuple of str
@@ -66,14 +75,8 @@ class Surrogate(Displayed):
         Minimum and maximum of each key.
     outputs : dict of str to int
         Quantities, and the number of values of each: levels have one per band.
-    bound : float
-        Maximum error of a predicted quantity, dB; quantities with larger errors are NaN.
     peaks : int
         Number of peaks of the assessed force, the same in all drops.
-    seed : int
-        Seed of the drops.
-    version : str
-        Version of thud that computed the drops.
     points : ndarray, shape (n_drop, n_key)
         The drops, in the unit cube.
     drops : ndarray, shape (n_drop, n_number)
@@ -86,19 +89,79 @@ class Surrogate(Displayed):
         Leave-one-out residuals: prediction minus result, dB.
     """
 
-    case: Case
-    keys: tuple[str, ...]
-    region: Array
-    outputs: dict[str, int]
-    bound: float
-    peaks: int
-    seed: int
-    version: str
-    points: Array
-    drops: Array
-    length: Array
-    weights: Array
-    residuals: Array
+    kind: ClassVar[str] = "surrogate"
+
+    dataset: xr.Dataset
+    case: Case = field(init=False)
+    keys: tuple[str, ...] = field(init=False)
+    region: Array = field(init=False)
+    outputs: dict[str, int] = field(init=False)
+    peaks: int = field(init=False)
+    points: Array = field(init=False)
+    drops: Array = field(init=False)
+    length: Array = field(init=False)
+    weights: Array = field(init=False)
+    residuals: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Learn the drops.
+
+        Raises InputError if they are not those of a surrogate, a drop has no result, or drops
+        differ in their number of peaks.
+        """
+        data = self.dataset
+        if data.attrs.get("study_kind") != self.kind or data.sizes["sample"] < MIN_DROPS:
+            refuse("the samples are not those of a surrogate", "results of a finished training")
+        if (failed := data["status"].to_numpy() != 0).any():
+            reason = data["reason"].to_numpy()[failed][0]
+            refuse(
+                f"{failed.sum()} of {failed.size} drops of the surrogate have no result ({reason})",
+                "ranges in which all drops have results",
+            )
+        if len(peaks := np.unique(data["peaks"]).astype(int).tolist()) > 1:
+            refuse(
+                f"the number of peaks differs among the drops of the surrogate: {peaks}",
+                "ranges in which it is the same: a count cannot be interpolated",
+            )
+        axes = [data[name] for name in data.attrs["parameters"].split()]
+        region = np.array([axis.attrs["range"] for axis in axes])
+        names = [str(name) for name in data if name in {*SAMPLE_QUANTITIES, *LEVELS}]
+        results = {name: _decibels(name, data[name].to_numpy()) for name in names}
+        self._set(
+            case=Case.from_text(data.attrs["case"]), keys=tuple(a.attrs["key"] for a in axes),
+            region=region, outputs={name: part.shape[1] for name, part in results.items()},
+            peaks=peaks[0], drops=np.concatenate(list(results.values()), axis=1),
+            points=(np.column_stack(axes) - region[:, 0]) / np.ptp(region, axis=1),
+        )  # fmt: skip
+        if (unknown := self.assessed & ~np.isfinite(self.drops).all(axis=0)).any():
+            label = self.labels[int(np.argmax(unknown))]
+            allowed = "a model and ranges where it is known"
+            refuse(f"{label} is 0 or not known in some drops", allowed)
+        self._set(**regress(self.points, self.drops, self.assessed))
+        super().__post_init__()
+
+    def _set(self, **values: object) -> None:
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+    @classmethod
+    def check(cls, study: Study) -> None:
+        """Raise InputError for a study whose samples cannot be learned."""
+        if study.case.floor:
+            refuse("a surrogate is not allowed with a floor", "a case without &floor")
+        if study.density is not None:
+            refuse("[fixed] density is not allowed for a surrogate", "mass")
+        if not MIN_DROPS <= study.size <= MAX_DROPS:
+            refuse_value("[design] size", study.size, f"{MIN_DROPS} to {MAX_DROPS}")
+        for parameter in study.parameters:
+            key = parameter.key
+            is_real = key.kind == "real" or (key.kind == "list" and not key.whole)
+            if not is_real or key.group in _GROUPS_OF_RECORDS or key not in KEYS:
+                allowed = "real numbers of ball, drop and model"
+                refuse(f"a surrogate cannot learn {parameter.name}", allowed)
+            if parameter.low is None:
+                label = f"[parameters] {parameter.name}"
+                refuse(f"{label} is not a range of a surrogate", "low, high, scale and unit")
 
     def __repr__(self) -> str:
         """Return the keys and the largest error of an assessed number."""
@@ -110,25 +173,17 @@ class Surrogate(Displayed):
     def to_dataframe(self) -> pd.DataFrame:
         """Return the errors of held-out drops by number, dB; raise InputError without pandas.
 
-        Columns: the error of 95 %, the maximum, the standard deviation of the results, and whether
-        the number is withheld because its error exceeds the bound.
+        Columns: the error of 95 %, the maximum, and the standard deviation of the results.
         """
         largest, spread = np.abs(self.residuals).max(axis=0), self.drops.std(axis=0)
         table = {"error_dB": self.errors, "maximum_dB": largest, "spread_dB": spread}
-        withheld = self.errors > self.bound
-        return data_frame(table | {"withheld": withheld}).set_axis(self.labels).dropna()
-
-    def to_xarray(self) -> xr.Dataset:
-        """Return the table of `to_dataframe` as a dataset."""
-        result: xr.Dataset = self.to_dataframe().rename_axis("number").to_xarray()
-        return result
+        return data_frame(table).set_axis(self.labels).dropna()
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text: the error of each quantity."""
-        header = ("held-out drops, dB", "95 %", "maximum", "spread", "")
-        return [header, *(
-            (name, *(f"{number:.2g}" for number in numbers), "withheld" if withheld else "")
-            for name, *numbers, withheld in self.to_dataframe().itertuples()
+        return [("held-out drops, dB", "95 %", "maximum", "spread"), *(
+            (name, *(f"{number:.2g}" for number in numbers))
+            for name, *numbers in self.to_dataframe().itertuples()
         )]  # fmt: skip
 
     @property
@@ -138,16 +193,12 @@ class Surrogate(Displayed):
 
     @property
     def accuracy(self) -> str:
-        """Number of training drops, maximum assessed error, and quantities that it withholds."""
+        """Number of training drops, and maximum assessed error."""
         label, error = self.worst
-        result = (
+        return (
             f"surrogate of {len(self.points)} drops: 95 % of held-out drops within {error:.2g} dB "
             f"({label}; other quantities of the verdict have smaller errors)"
         )
-        withheld = [n for n, e in zip(self.labels, self.errors, strict=True) if e > self.bound]
-        if withheld:
-            result += f"; withheld, with errors above {self.bound:g} dB: {', '.join(withheld)}"
-        return result
 
     def plot(self) -> Figure:
         """Return the errors of the held-out drops."""
@@ -198,17 +249,8 @@ class Surrogate(Displayed):
 
     def require(self, case: Case, names: Iterable[str]) -> None:
         """Raise InputError if it cannot predict a case in which the named keys vary."""
-        if self.version != version():
-            refuse(
-                f"the surrogate was trained by thud {self.version}", f"training by thud {version()}"
-            )
-        label, error = self.worst
-        if not error <= self.bound:
-            refuse(
-                f"the training of the surrogate is not finished: its error of the {label} is "
-                f"{error:.3g} dB",
-                f"a surrogate with errors up to {self.bound:g} dB",
-            )
+        if (trained := self.dataset.attrs["thud_version"]) != version():
+            refuse(f"the surrogate was trained by thud {trained}", f"training by thud {version()}")
         if more := [name for name in names if name not in self.keys]:
             refuse(
                 f"the surrogate was not trained on {', '.join(more)}",
@@ -225,7 +267,7 @@ class Surrogate(Displayed):
     def predict(self, case: Case, columns: Columns) -> Columns:
         """Return the results of samples of a case that differ in some keys, shape (n_sample,) each.
 
-        The results are those of `thud.studies.samples.evaluate`, and ``undecided``: whether errors
+        The results are those of `thud.studies.run.evaluate`, and ``undecided``: whether errors
         could change the verdict. Samples outside the region have a status and a reason instead.
         Raises InputError like `require`.
         """
@@ -248,7 +290,6 @@ class Surrogate(Displayed):
                 chunk = slice(start, start + _CHUNK_SIZE)
                 numbers[chunk] = matern(points[chunk], self.points / self.length) @ self.weights
         numbers += self.drops.mean(axis=0)
-        numbers[:, ~(self.errors <= self.bound)] = np.nan
         numbers[outside.any(axis=1)] = np.nan
         reasons = np.full(count, "", dtype=object)
         for i in np.flatnonzero(outside.any(axis=1)):
@@ -279,20 +320,8 @@ class Surrogate(Displayed):
 
     @property
     def digest(self) -> str:
-        """Checksum of its content."""
-        return sha256(self.to_bytes()).hexdigest()
-
-    def to_bytes(self) -> bytes:
-        """Return the content of its file."""
-        header = {name: v for name, v in vars(self).items() if name not in {*_ARRAYS, "case"}}
-        header["case"] = case_text(self.case).decode()
-        file = io.BytesIO()
-        np.savez(file, header=json.dumps(header), **{name: vars(self)[name] for name in _ARRAYS})
-        return file.getvalue()
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the file ``.npz`` that `read_surrogate` reads, atomically."""
-        replace_file(path, self.to_bytes())
+        """Checksum of the training drops."""
+        return sha256(np.column_stack([self.points, self.drops]).tobytes()).hexdigest()
 
 
 def matern(points: Array, drops: Array) -> Array:
@@ -348,26 +377,60 @@ def differing_keys(before: Case, now: Case) -> list[tuple[str, str, str]]:
 
 
 def read_surrogate(path: str | os.PathLike[str]) -> Surrogate:
-    """Read a surrogate from its file, which holds numbers and text only, no code.
+    """Read a surrogate from the results of its training, and learn the drops again.
 
     Raises
     ------
     InputError
-        If the file is damaged or not a surrogate.
+        If the file is damaged or has no training drops.
     OSError
         If the file temporarily cannot be read.
     """
     require_kind("surrogate", path, str | Path)
-    try:
-        with np.load(io.BytesIO(read_input(Path(path))), allow_pickle=False) as file:
-            header = json.loads(str(file["header"]))
-            header |= {name: np.asarray(file[name], dtype=np.float64) for name in _ARRAYS}
-        header["case"] = Case.from_text(header["case"])
-        result = Surrogate(**header)
-    except Exception as error:
-        if is_failure(error):
-            raise
-        # Zip, NumPy and JSON raise many kinds of errors.
-        reason = getattr(error, "strerror", None) or "not a surrogate, or damaged"
-        refuse(f"{path} cannot be read: {reason}", "a file that Surrogate.save wrote", error)
+    return Surrogate(read_dataset(Path(path)))
+
+
+def _decibels(name: str, values: Array) -> Array:
+    """Return a quantity in dB, shape (n, count); NaN if any value has no logarithm."""
+    if name in LEVELS:
+        return values
+    if (values <= 0).any():
+        values = np.full_like(values, np.nan)
+    result: Array = 20 * np.log10(values)[:, np.newaxis]
     return result
+
+
+def regress(points: Array, values: Array, assessed: NDArray[np.bool_]) -> dict[str, Any]:
+    """Return a Gaussian process through values at points in the unit cube.
+
+    Correlation lengths and noise (of time steps, and of nodes that touch one by one) maximize the
+    likelihood of the assessed quantities; the other quantities share them. Returns the
+    fields length, weights and residuals of a `Surrogate`.
+    """
+    with require_extra("surrogate"):
+        from sklearn.exceptions import ConvergenceWarning
+        from sklearn.gaussian_process import GaussianProcessRegressor
+        from sklearn.gaussian_process.kernels import ConstantKernel, Matern, WhiteKernel
+    mean, scale = values.mean(axis=0), values.std(axis=0)
+    # Constant quantities, such as a prescribed contact time.
+    scale[scale <= _CONSTANT * np.maximum(np.abs(mean), 1.0)] = 0.0
+    varies = scale > 0  # false for NaN
+    normalized = np.where(varies, (values - mean) / np.where(varies, scale, 1.0), 0.0)
+    fitted = assessed & varies if (assessed & varies).any() else assessed
+    shape = Matern(np.full(points.shape[1], 2.0), (0.05, 50.0), nu=SMOOTHNESS)
+    kernel = ConstantKernel(10.0, (1e-2, 1e6)) * shape + WhiteKernel(1e-2, (1e-10, 10.0))
+    process = GaussianProcessRegressor(kernel)
+    with warnings.catch_warnings(), threadpool_limits(1, "blas"):
+        # A parameter without effect gets the maximum length.
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        process.fit(points, normalized[:, fitted])
+        inverse = cho_solve((process.L_, True), np.eye(len(points)))
+        weights = inverse @ normalized
+    signal = process.kernel_.k1
+    # Leave-one-out residuals (Rasmussen and Williams 2006, eq. 5.12).
+    residuals = np.where(varies, -weights / np.diag(inverse)[:, None], 0.0) * scale
+    return {
+        "length": np.broadcast_to(signal.k2.length_scale, points.shape[1:]).astype(float),
+        "weights": signal.k1.constant_value * weights * np.where(varies, scale, 0.0),
+        "residuals": np.where(np.isfinite(mean), residuals, np.nan),
+    }
