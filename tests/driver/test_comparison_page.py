@@ -13,7 +13,7 @@ import pytest
 from test_figure_look import assert_clean
 
 import thud
-from thud.plot.pages import comparison_figure, comparison_html
+from thud.comparison.comparison import Comparison
 from thud.plot.style import WIDTH
 
 if TYPE_CHECKING:
@@ -22,11 +22,7 @@ if TYPE_CHECKING:
 
 SHELL, SOFT = thud.solve(), thud.solve(thud.Ball(youngs_modulus=1.2e6), duration=0.5)
 IMPACTS: dict[str, thud.Impact | thud.Recording] = {"shell <1>": SHELL, "soft $x^{$": SOFT}
-TABLE = [
-    ("", *IMPACTS, "limits, rubber ball"),
-    ("31.5 Hz, dB", "38.53", "36.10 low", "38 to 40"),
-    ("verdict", "does not conform", "does not conform", ""),
-]
+COMPARISON = Comparison(IMPACTS, {})
 
 
 def plots(page: str) -> list[dict[str, Any]]:
@@ -36,8 +32,7 @@ def plots(page: str) -> list[dict[str, Any]]:
 
 
 def test_page_has_the_curves_of_the_picture() -> None:
-    figure = comparison_figure(IMPACTS, "floor", "rubber_ball")
-    page = plots(comparison_html(IMPACTS, "floor", "rubber_ball", TABLE))
+    figure, page = COMPARISON.plot(), plots(COMPARISON.html())
     assert len(page) == 3
     for axes, drawn in zip(figure.axes, page, strict=False):
         assert "{title}, {unit}".format(**drawn["x"]) == axes.get_xlabel()
@@ -54,22 +49,21 @@ def test_page_has_the_curves_of_the_picture() -> None:
 
 
 def test_tolerance_is_that_of_the_octaves() -> None:
-    _, octaves, thirds = plots(comparison_html(IMPACTS, None, "tyre", TABLE))
+    _, octaves, thirds = plots(Comparison(IMPACTS, {}, source="tyre").html())
     criteria = SHELL.assess("tyre").criteria[:5]
     assert octaves["limits"] == [[c.lower, c.upper] for c in criteria]
     assert "limits" not in thirds
 
 
 def test_names_and_cells_are_no_code() -> None:
-    page = comparison_html({"</script><b>": SHELL}, None, "rubber_ball", [("<i>",), ("a & b",)])
-    assert "<i>" not in page
-    assert "a &amp; b" in page
+    page = Comparison({"</script><b>": SHELL, "a & b": SHELL}, {}).html()
+    assert "<th>a &amp; b</th>" in page
     assert "</script><b>" not in page
     assert plots(page)[0]["curves"][0]["name"] == "</script><b>"
 
 
 def test_page_suits_narrow_screens_and_dark_ones() -> None:
-    page = comparison_html(IMPACTS, None, "rubber_ball", TABLE)
+    page = COMPARISON.html()
     assert '<meta name="viewport" content="width=device-width' in page
     assert "prefers-color-scheme: dark" in page
     assert "minmax(min(100%," in page
@@ -80,7 +74,7 @@ def test_page_suits_narrow_screens_and_dark_ones() -> None:
 @pytest.mark.parametrize("count", [1, 3, 9])
 def test_picture_is_a_column_wide_for_any_number_of_cases(count: int) -> None:
     names = [f"a_case_with_a_name_that_is_rather_long_{i}" for i in range(count)]
-    figure = comparison_figure(dict.fromkeys(names, SHELL), None, "rubber_ball")
+    figure = Comparison(dict.fromkeys(names, SHELL), {}).plot()
     assert figure.get_figwidth() == pytest.approx(WIDTH)
     assert_clean(figure)
 
@@ -103,7 +97,7 @@ def open_in_browser(path: Path, html: str) -> Iterator[Any]:
 
 def test_browser_draws_the_curves_and_hides_them(tmp_path: Path) -> None:
     sync_api = pytest.importorskip("playwright.sync_api")
-    html = comparison_html(IMPACTS, None, "rubber_ball", TABLE)
+    html = COMPARISON.html()
     with open_in_browser(tmp_path / "page.html", html) as page:
         curves = page.locator(".plot .curve")
         # Two curves in three plots; five octaves have a tolerance.
@@ -130,8 +124,7 @@ def assert_scrolls_inside(page: Any, table: Any, width: int) -> None:  # noqa: A
 @pytest.mark.parametrize("width", [320, 390, 1000])
 def test_table_scrolls_inside_a_narrow_page(width: int, tmp_path: Path) -> None:
     names = [f"a_case_with_a_name_that_is_rather_long_{i}" for i in range(9)]
-    rows = [("", *names), *(("number of force peaks", *["1574.3 high"] * 9) for _ in range(12))]
-    html = comparison_html(dict.fromkeys(names, SHELL), None, "rubber_ball", rows)
+    html = Comparison(dict.fromkeys(names, SHELL), {}).html()
     with open_in_browser(tmp_path / "page.html", html) as page:
         assert_scrolls_inside(page, page.locator(".table"), width)
         # At least two columns of numbers are in sight.

@@ -49,7 +49,7 @@ def test_margin_of_a_source_with_known_levels() -> None:
 def test_case_is_marked() -> None:
     result = thud.design(MODAL)
     assert result.mark == (0.032, 1.56e6)
-    figure = thud.plot.draw_design(result)
+    figure = result.plot()
     axes, bar = figure.axes
     (star,) = [line for line in axes.lines if line.get_marker() == "*"]
     # Whole on an edge of the map.
@@ -66,7 +66,7 @@ def test_scale_of_the_study_is_that_of_the_axes() -> None:
     modulus = {"low": 1e5, "high": 1e8, "count": 7, "scale": "log"}
     height = {"low": 1, "high": 2, "count": 2, "scale": "log"}
     result = thud.design({"parameters": {"youngs_modulus": modulus, "height": height}})
-    figure = thud.plot.draw_design(result)
+    figure = result.plot()
     axes, _ = figure.axes
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
     # 1e8 Pa would need a power of ten beside the axis, over the legend.
@@ -77,7 +77,7 @@ def test_scale_of_the_study_is_that_of_the_axes() -> None:
     assert {"0.1", "1", "10", "100"} <= set(shown)
     shown = [text.get_text() for text in axes.get_yticklabels()]
     assert {"1", "1.2", "1.4"} <= set(shown)
-    assert thud.plot.draw_design(thud.design(MODAL)).axes[0].get_xscale() == "linear"
+    assert thud.design(MODAL).plot().axes[0].get_xscale() == "linear"
 
 
 def test_limit_of_a_class_that_no_sample_passes_is_not_in_the_legend() -> None:
@@ -91,7 +91,7 @@ def test_limit_of_a_class_that_no_sample_passes_is_not_in_the_legend() -> None:
 def test_colours_of_a_map_without_conformity_end_at_zero() -> None:
     heights = {"low": 0.1, "high": 0.5, "count": 4}
     study = {"parameters": {"height": heights, "mass": {"values": [2.0, 2.5]}}}
-    axes, bar = thud.plot.draw_design(thud.design(study)).axes
+    axes, bar = thud.design(study).plot().axes
     low, high = bar.get_ylim()
     margin = thud.design(study).dataset["margin"].values
     assert low <= margin.min()
@@ -109,7 +109,7 @@ def test_colours_of_a_map_without_conformity_end_at_zero() -> None:
 def test_map_of_nearly_one_margin_is_drawn() -> None:
     heights = {"low": 0.1, "high": 0.1001, "count": 2}
     study = {"parameters": {"height": heights, "mass": {"values": [2.0, 2.0001]}}}
-    axes, _ = thud.plot.draw_design(thud.design(study)).axes
+    axes, _ = thud.design(study).plot().axes
     assert not axes.texts
 
 
@@ -117,7 +117,7 @@ def test_places_without_results_stay_empty() -> None:
     study = {"parameters": {"height": {"values": [0.5, 1, -1]}, "mass": {"values": [2, 3, 4]}}}
     result = thud.design(study)
     assert int(np.isnan(result.dataset["margin"]).sum()) == 3
-    thud.plot.draw_design(result)
+    result.plot()
     assert ("samples", "9") in result.rows()
 
 

@@ -1,57 +1,173 @@
-"""Text, HTML, figures, datasets and tables of results."""
+"""The contract of results: text, HTML, notes, table, dataset, figure and file of every result."""
 
 from __future__ import annotations
 
+import inspect
+from functools import cache
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 from conftest import recorded
+from matplotlib.figure import Figure
 
 import thud
-from thud.base.tables import format_rows
+from thud.base.display import Displayed, Tabulated
+from thud.base.note import Note
+from thud.base.tables import WIDTH, format_rows
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
-    from thud.base.display import Displayed
-
+LUMPED: thud.ModelOptions = thud.HuntCrossley(contact_time=0.02, restitution=0.8)
 MASS = {"mass": {"low": 2.4, "high": 2.6}}
+GRID = {"mass": {**MASS["mass"], "count": 2}, "height": {"values": [0.5, 1.0]}}
+OCTAVES = np.array([63.0, 125.0, 250.0, 500.0])
+FREQUENCY = np.array([20.0, 30.0, 40.0, 50.0])
+FIXED = {"fixed": {"model": "hunt_crossley", "contact_time": 0.02, "restitution": 0.8}}
 
 
-def results(impact: thud.Impact) -> list[Displayed]:
-    many = thud.solve_many({"mass": [2.0, -1.0]})
-    judged = impact.assess()
-    record = recorded(impact)
-    modes = thud.free_modes(count=2)
-    grid = {"mass": {**MASS["mass"], "count": 2}, "height": {"values": [0.5, 1.0]}}
-    studies = [
-        thud.design({"parameters": grid}),
-        thud.uncertainty({"parameters": MASS, "design": {"size": 4}}),
-        thud.sensitivity({"parameters": MASS, "design": {"size": 4}}),
-        thud.fit(thud.solve(), ["mass"]),
-        thud.compare({"one": impact, "two": record}),
-    ]
-    basics = [impact, judged, many, modes, record, thud.get_bands("third")]
-    return [*basics, *studies]
+@cache
+def impact() -> thud.Impact:
+    return thud.solve(model="hollow_sphere", floor=thud.InfinitePlate(1600.0))
 
 
-def test_results_have_a_line_and_a_table(flagship: thud.Impact) -> None:
-    for result in results(flagship):
-        text = repr(result)
-        assert "\n" not in text
-        assert "array" not in text
-        assert len(text) < 120
-        assert text.startswith(f"<{type(result).__name__}")
-        title, table = ET.fromstring(f"<html>{result._repr_html_()}</html>")  # noqa: S314
-        assert title.text == text[1:-1]
-        assert [[cell.text or "" for cell in row] for row in table] == [
-            list(r) for r in result.rows()
-        ]
-        widths = {len(row) for row in result.rows()}
-        assert len(widths) == 1
+@cache
+def below() -> thud.RoomPrediction:
+    return thud.predict_level(impact(), thud.Plate(thickness=0.2), thud.Room(volume=40.0))
+
+
+def moved() -> thud.FloorImpact:
+    assert impact().on_floor
+    return impact().on_floor
+
+
+@cache
+def sound() -> thud.RoomSound:
+    return thud.listen({"thin": below(), "same": below()}, pause=0.5)
+
+
+def press() -> thud.CompressionCurve:
+    return thud.compress(points=5)
+
+
+def measured() -> thud.Mobility:
+    return thud.Mobility(FREQUENCY, np.full(4, 1e-5 + 1e-6j))
+
+
+# An example of every result that is public, and the ending of its file.
+RESULTS: dict[Callable[[], Displayed], str] = {
+    impact: ".csv",
+    moved: ".csv",
+    lambda: moved().injected_energy(): ".csv",
+    lambda: recorded(impact()): ".csv",
+    lambda: impact().assess(): ".csv",
+    lambda: thud.compare({"one": impact(), "two": recorded(impact())}): "",
+    lambda: thud.solve_many({"mass": [2.0, -1.0, 2.5]}): ".csv",
+    lambda: thud.free_modes(count=2): ".vtu",
+    press: ".csv",
+    lambda: thud.blocked_force(impact()): ".csv",
+    measured: ".csv",
+    lambda: thud.fit_mobility(measured(), order=1): ".nml",
+    lambda: thud.ball_impedance(impact(), [1e4, 1e5]): ".csv",
+    below: ".csv",
+    lambda: thud.modal_room(below()): ".csv",
+    lambda: thud.compare_floors({"one": below(), "two": below()}): "",
+    lambda: thud.tapping_level(thud.Plate()): ".csv",
+    lambda: thud.RoomLevels("site", "octave", OCTAVES, np.full((2, 4), 60.0)): ".csv",
+    lambda: thud.rating([60.0, 55, 50, 45]): ".csv",
+    thud.get_bands: ".csv",
+    sound: ".wav",
+    lambda: sound().sounds[0]: ".csv",
+    lambda: thud.sweep({**FIXED, "parameters": GRID}): ".nc",
+    lambda: thud.design({**FIXED, "parameters": GRID}): ".nc",
+    lambda: thud.uncertainty({**FIXED, "parameters": MASS, "design": {"size": 4}}): ".nc",
+    lambda: thud.sensitivity({**FIXED, "parameters": MASS, "design": {"size": 4}}): ".nc",
+    lambda: thud.surrogate({**FIXED, "parameters": MASS, "design": {"size": 64}}): ".nc",
+    lambda: thud.fit(thud.solve(model=LUMPED), ["mass"], thud.Case(model=LUMPED)): "",
+    lambda: thud.fit_compression(press().deflection, press().force): "",
+}
+# Numbers and definitions that have no figure.
+WITHOUT_FIGURE = (thud.Rating, thud.Bands)
+
+
+@pytest.fixture(scope="module", params=RESULTS.items(), ids=map(str, range(len(RESULTS))))
+def example(request: pytest.FixtureRequest) -> tuple[Displayed, str]:
+    """Return a result and the ending of its file."""
+    make, ending = request.param
+    return make(), ending
+
+
+def test_every_public_result_has_an_example() -> None:
+    public = {getattr(thud, name) for name in thud.__all__}
+    kinds = {kind for kind in public if inspect.isclass(kind) and issubclass(kind, Displayed)}
+    assert kinds == {type(make()) for make in RESULTS}
+
+
+def test_results_have_a_line_and_a_table(example: tuple[Displayed, str]) -> None:
+    result, _ = example
+    text = repr(result)
+    assert "\n" not in text
+    assert "array" not in text
+    assert len(text) < 160
+    assert text.startswith(f"<{type(result).__name__}")
+    title, table = ET.fromstring(f"<html>{result._repr_html_()}</html>")  # noqa: S314
+    # Indices of symbols are below the line.
+    assert _plain("".join(title.itertext())) == _plain(text[1:-1])
+    cells = [[_plain("".join(cell.itertext())) for cell in row] for row in table]
+    assert cells == [[*map(_plain, row)] for row in result.rows()]
+    assert len({len(row) for row in cells}) == 1
+    assert all(isinstance(note, Note) for note in result.notes)
+    assert not isinstance(inspect.getattr_static(result, "warnings", None), property)
+
+
+def _plain(text: str) -> str:
+    return text.replace("_", "")
+
+
+def test_results_are_data(example: tuple[Displayed, str], tmp_path: Path) -> None:
+    """Tables and datasets have the same numbers, and units; files are not empty."""
+    result, ending = example
+    table, data = result.to_dataframe(), result.to_xarray()
+    assert isinstance(table, pd.DataFrame)
+    assert isinstance(data, xr.Dataset)
+    assert len(table)
+    assert table.columns.is_unique
+    if isinstance(result, Tabulated):
+        # Both follow from `columns`, in their order.
+        assert len(data.dims) == 1
+        for name, column in zip(result.columns(), table, strict=True):
+            variable = data[name.partition(", ")[0].replace(" ", "_")]
+            assert variable.attrs["units"] == (name.partition(", ")[2] or "1")
+            np.testing.assert_array_equal(variable.values, table[column].to_numpy())
+    path = tmp_path / f"result{ending}"
+    result.save(path)
+    files = [*path.iterdir()] if path.is_dir() else [path]
+    assert path.is_dir() == (not ending)
+    assert all(file.stat().st_size for file in files)
+
+
+def test_results_are_drawn(example: tuple[Displayed, str]) -> None:
+    """Axes of a user show the same as a panel of the own figure, and no figure is made."""
+    result, _ = example
+    if isinstance(result, WITHOUT_FIGURE):
+        with pytest.raises(thud.InputError):
+            result.plot()
+        return
+    own = result.plot()
+    left, right = Figure().subplots(1, 2)
+    assert isinstance(own, Figure)
+    assert result.plot(right) is right.figure
+    assert right.has_data()
+    assert not left.has_data()
+    assert any(np.allclose(right.get_xlim(), axes.get_xlim()) for axes in own.axes)
+    labels = {axes.get_xlabel() for axes in own.axes} | {own.get_supxlabel()}
+    assert right.get_xlabel() in labels
+    assert len(right.lines) in [len(axes.lines) for axes in own.axes]
 
 
 def test_texts_name_verdicts_and_numbers(flagship: thud.Impact) -> None:
@@ -71,64 +187,30 @@ def test_texts_name_verdicts_and_numbers(flagship: thud.Impact) -> None:
         assert all(word in text for word in words)
 
 
-def test_verdict_has_every_form_of_a_result(flagship: thud.Impact, tmp_path: Path) -> None:
+def test_criteria_are_drawn_as_fractions_of_their_ranges(flagship: thud.Impact) -> None:
     verdict = flagship.assess()
-    table, data = verdict.to_dataframe(), verdict.to_xarray()
-    assert table["criterion"].tolist() == [*(c.name for c in verdict.criteria), "all"]
-    np.testing.assert_array_equal(data["value"][:-1], [c.value for c in verdict.criteria])
-    assert data["result"].values[-1] == verdict.conforms
-    verdict.save(tmp_path / "verdict.csv")
-    assert (tmp_path / "verdict.csv").read_text() == verdict.to_csv()
-    (own,) = verdict.plot().axes  # type: ignore[union-attr]
-    axes = thud.plot.empty_axes(3.0)[1]
-    assert verdict.plot(axes) is axes
-    assert own.get_xlim() == axes.get_xlim()
-    low, value, high = sorted((axes.lines[0].get_xdata()[0], 0.0, 1.0))
-    assert (low, high) == (0.0, 1.0)
-    first = verdict.criteria[0]
-    assert value == pytest.approx((first.value - first.lower) / (first.upper - first.lower))
+    (axes,) = verdict.plot().axes
+    first, (drawn,) = verdict.criteria[0], axes.lines[0].get_xdata()
+    assert drawn == pytest.approx((first.value - first.lower) / (first.upper - first.lower))
 
 
-def test_a_table_has_one_list_of_columns(flagship: thud.Impact) -> None:
+def test_a_table_has_one_list_of_columns() -> None:
     level = thud.TappingLevel(np.array([50.0, 63.0]), np.array([60.04, np.nan]))
     assert level.rows() == [("band, Hz", "L_n, dB"), ("50", "60.0"), ("63", "")]
     assert level.to_csv() == "band_Hz,L_n_dB\n50,60.04\n63,nan\n"
-    for result in (thud.get_bands(), thud.free_modes(count=2), thud.predict_level(
-        flagship, thud.Plate(), thud.Room()
-    )):  # fmt: skip
-        table = result.to_dataframe()
-        assert len(table) == len(result.rows()) - 1
-        assert table.columns[0].endswith("_Hz")
-        data = result.to_xarray()
-        (axis,) = data.dims
-        assert data[axis].attrs["units"] == "Hz"
-        assert len(data.data_vars) == len(table.columns) - 1
 
 
 def test_warnings_are_shown() -> None:
     with pytest.warns(thud.PlausibilityWarning):
         odd = thud.solve(thud.Ball(mass=0.5, youngs_modulus=1e5))
-    assert [row[1] for row in odd.rows() if row[0] == "warning"] == list(odd.warnings)
-    assert odd.warnings
+    assert [row[1] for row in odd.rows() if row[0] == "warning"] == list(map(str, odd.notes))
+    assert odd.notes
 
 
 def test_html_is_escaped(flagship: thud.Impact) -> None:
     shown = thud.compare({"<script>&": flagship})._repr_html_()
     assert "<script>" not in shown
     assert shown.count("&lt;script&gt;&amp;") == 2
-
-
-def test_figure_shows_force_and_levels(flagship: thud.Impact) -> None:
-    history, octaves = flagship.plot().axes
-    assert history.get_xlabel() == "Time since first touch, ms"
-    (line,) = [line for line in octaves.lines if len(line.get_xdata()) == 5]
-    np.testing.assert_array_equal(line.get_ydata(), flagship.levels())
-    record = recorded(flagship)
-    (octaves,) = record.plot().axes
-    labels = octaves.get_legend_handles_labels()[1]
-    assert labels[:2] == ["Tolerance, rubber ball", "Nominal"]
-    (forces,) = record.plot("force").axes
-    assert forces.get_xlabel() == "Time since first touch, ms"
 
 
 def test_dataset_of_an_impact_has_units_and_provenance(

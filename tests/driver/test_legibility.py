@@ -16,7 +16,7 @@ from PIL import Image
 from test_comparison_page import open_in_browser
 
 import thud
-from thud.plot import draw_design, draw_surrogate, legend_above, own_style
+from thud.plot import legend_above, own_style
 from thud.plot.style import empty_axes
 
 if TYPE_CHECKING:
@@ -93,10 +93,10 @@ def test_plots_of_a_surrogate_are_legible() -> None:
         "youngs_modulus": {"low": 1.6, "high": 2.0, "unit": "MPa"},
     }
     trained = thud.surrogate({**study, "design": {"size": 64}, "parameters": ranges})
-    assert find_faults(draw_surrogate(trained)) == []
+    assert find_faults(trained.plot()) == []
     axes = {name: {**limits, "count": 41} for name, limits in ranges.items()}
     found = thud.design({**study, "parameters": axes}, surrogate=trained)
-    assert find_faults(draw_design(found)) == []
+    assert find_faults(found.plot()) == []
 
 
 def glyph_sizes(path: Path) -> list[float]:

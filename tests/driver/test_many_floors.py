@@ -130,7 +130,7 @@ def test_studies_vary_floors_and_rooms(tmp_path: Path, many: thud.Ensemble) -> N
     # A larger room is quieter.
     assert (rating.values[:, 0] > rating.values[:, 1]).all()
     assert ("lowest rating, dB", f"{float(rating.min()):.2f}") in found.rows()
-    thud.plot.save(thud.plot.draw_design(found), tmp_path / "map.png")
+    thud.plot.save(found.plot(), tmp_path / "map.png")
     assert found.dataset["room_third"].dims[-1] == "rated_third"
     draws = {"kind": "random", "size": 4}
     parameters = {"reverberation_time(1)": {"low": 0.4, "high": 0.6}}

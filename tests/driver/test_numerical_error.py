@@ -44,7 +44,7 @@ def test_results_keep_the_stated_error(case_file: CaseFile, run: Run, tmp_path: 
 def test_small_errors_are_not_shown(case_file: CaseFile, run: Run) -> None:
     impact = thud.solve()
     assert 0 < impact.level_error.max() < 0.15
-    assert impact.warnings == ()
+    assert impact.notes == ()
     assert "error at" not in run(case_file(MINIMAL)).stdout
 
 

@@ -226,7 +226,7 @@ def test_model_may_be_an_object() -> None:
 
 def test_standard_ball_conforms(flagship: thud.Impact) -> None:
     assert flagship.assess()
-    assert flagship.warnings == ()
+    assert flagship.notes == ()
 
 
 @pytest.mark.parametrize(

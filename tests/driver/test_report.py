@@ -427,7 +427,7 @@ def test_equal_recordings_give_equal_pages(one: Recording, tmp_path: Path) -> No
 def test_figures_show_every_drop_the_average_and_the_limits(one: Recording, count: int) -> None:
     recording = many(one, count)
     for bands in ("octave", "third"):
-        assert_clean(recording_levels(recording, bands))
+        assert_clean(recording_levels(recording, bands=bands))
     figure = recording_forces(recording)
     assert_clean(figure)
     (axes,) = figure.axes
@@ -442,7 +442,7 @@ def test_figures_show_every_drop_the_average_and_the_limits(one: Recording, coun
     assert ("average" in labels) == (count > 1)
     assert ("outlier" in labels) == ("range of 60 drops" in labels) == (count == 60)
     for bands in ("octave", "third"):
-        axes = recording_levels(recording, bands).axes[0]
+        axes = recording_levels(recording, bands=bands).axes[0]
         bars = axes.containers[0]
         np.testing.assert_allclose(bars.lines[0].get_ydata(), recording.levels(bands))
         half = [np.ptp(segment[:, 1]) / 2 for segment in bars.lines[2][0].get_segments()]

@@ -86,7 +86,7 @@ def test_samples_without_results_are_left_out() -> None:
 
 
 def test_figure_shows_every_index(lumped: Sensitivity) -> None:
-    figure = thud.plot.draw_sensitivity(lumped)
+    figure = lumped.plot()
     assert [axes.get_title() for axes in figure.axes] == ["mass", "height", "outer radius"]
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels == ["total index", "95 % interval", "first order"]
@@ -111,7 +111,7 @@ def test_figure_of_five_parameters_fits_on_half_a_page() -> None:
         "wall_thickness": {"low": 0.03, "high": 0.034},
     }
     study = {**LUMPED, "design": {"size": 8}, "parameters": parameters}
-    assert thud.plot.draw_sensitivity(thud.sensitivity(study)).get_figheight() < 4.4
+    assert thud.sensitivity(study).plot().get_figheight() < 4.4
 
 
 def test_useless_designs_are_reported() -> None:

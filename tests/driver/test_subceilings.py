@@ -230,11 +230,11 @@ def test_air_of_the_room_damps_the_floor_and_changes_the_force() -> None:
 
 def test_limits_of_cavity_and_board_are_warned_of() -> None:
     deep = thud.solve(model="hollow_sphere", floor=replace(HUNG, cavity_depth=0.5))
-    assert any("above 172 Hz the cavity" in warning for warning in deep.warnings)
+    assert any("above 172 Hz the cavity" in str(note) for note in deep.notes)
     thick = replace(HUNG, cavity_depth=0.02, subceiling_thickness=0.2, subceiling_modulus=1e8)
-    warnings = thud.solve(model="hollow_sphere", floor=thick).warnings
-    assert any("six thicknesses of the subceiling" in warning for warning in warnings)
-    assert not any("subceiling" in warning for warning in thud.solve(floor=CONCRETE).warnings)
+    notes = thud.solve(model="hollow_sphere", floor=thick).notes
+    assert any("six thicknesses of the subceiling" in str(note) for note in notes)
+    assert not any("subceiling" in str(note) for note in thud.solve(floor=CONCRETE).notes)
 
 
 def test_foils_are_no_subceilings() -> None:

@@ -340,12 +340,12 @@ def test_map_shows_undecided_verdicts(trained: thud.Surrogate) -> None:
     )
     assert 0 < int(undecided.sum()) < undecided.size
     assert ("undecided because of the surrogate", f"{int(undecided.sum())}") in found.rows()
-    labels = [text.get_text() for text in thud.plot.draw_design(found).legends[0].get_texts()]
+    labels = [text.get_text() for text in found.plot().legends[0].get_texts()]
     assert "Undecided by surrogate" in labels
 
 
 def test_figure_shows_held_out_errors(trained: thud.Surrogate) -> None:
-    figure = thud.plot.draw_surrogate(trained)
+    figure = trained.plot()
     (axes,) = figure.axes
     labels = [label.get_text() for label in axes.get_yticklabels()]
     assert labels == [

@@ -50,7 +50,7 @@ def test_thirds_on_request(model: str, bands: str, tmp_path: Path) -> None:
         for name, kind in ((f"{force}_octave", "octave"), (f"{force}_third", "third")):
             cell = found[name].sel(height=0.5, mass=2.6)
             np.testing.assert_allclose(cell, impact.levels(kind, force=force), atol=1e-6)
-    assert thud.plot.draw_sweep(thud.Sweep(found)).axes
+    assert thud.Sweep(found).plot().axes
 
 
 def test_dataset_tells_units_and_where_it_comes_from(tmp_path: Path) -> None:
@@ -623,5 +623,5 @@ def test_samples_state_sources_that_do_not_conform() -> None:
         "parameters": {"plate.thickness": {"low": 0.14, "high": 0.2, "count": 2}},
     }
     shell = thud.sweep({"case": {**case, "model": {"name": "hollow_sphere"}}, **study})
-    assert "2 of 2 samples do not conform" in " ".join(map(str, shell.warnings))
-    assert thud.sweep({"case": case, **study}).warnings == ()
+    assert "2 of 2 samples do not conform" in " ".join(map(str, shell.notes))
+    assert thud.sweep({"case": case, **study}).notes == ()

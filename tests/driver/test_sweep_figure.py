@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import thud
-from thud.plot import draw_sweep
 from thud.plot.style import RATING_SYMBOL, WIDTH
 
 if TYPE_CHECKING:
@@ -22,7 +21,7 @@ NOMINAL = np.array([39, 31, 23, 17, 12.5])
 
 
 def draw(**study: Any) -> Figure:  # noqa: ANN401 - of a study
-    return draw_sweep(thud.sweep({"fixed": {"model": "hollow_sphere"}, **study}))
+    return thud.sweep({"fixed": {"model": "hollow_sphere"}, **study}).plot()
 
 
 def curves(axes: Axes) -> np.ndarray:

@@ -78,7 +78,7 @@ def test_samples_without_results_are_counted_apart() -> None:
 
 def test_figure_shows_distribution_over_tolerance() -> None:
     result = thud.uncertainty({**SMALL, "design": {"size": 40}})
-    figure = thud.plot.draw_uncertainty(result)
+    figure = result.plot()
     (axes,) = figure.axes
     limits = thud.solve().assess().criteria[:5]
     boxes = [body.get_datalim(axes.transData).intervaly for body in axes.collections[:5]]

@@ -59,7 +59,7 @@ files = thud.write_report(record, folder / "report")
 for figure in (
     flagship.plot(),
     pressed.plot(),
-    record.plot("force"),
+    record.plot(kind="force"),
     thud.plot.levels(impacts),
     page.plot(),
 ):

@@ -19,7 +19,7 @@ def get_fault(impact: thud.Impact) -> str:
         if broken:
             return f"{'on floor' if one is impact.on_floor else 'rigid'}: {', '.join(broken)}"
     missing = [words for words, outside in _outside(impact).items()
-               if outside and not any(words in warning for warning in impact.warnings)]  # fmt: skip
+               if outside and not any(words in str(note) for note in impact.notes)]  # fmt: skip
     return f"no warning on {', '.join(missing)}" if missing else ""
 
 

@@ -87,5 +87,5 @@ def _try(model: str, chance: random.Random) -> Finding:
         except thud.ThudError as error:
             return Finding("NaN", str(error)) if "NaN" in str(error) else Finding("refused")
     if wrong:
-        return Finding("wrong", f"{wrong}; {case_text(case).decode().split()} {impact.warnings}")
-    return Finding("warned" if impact.warnings else "computed")
+        return Finding("wrong", f"{wrong}; {case_text(case).decode().split()} {impact.notes}")
+    return Finding("warned" if impact.notes else "computed")

@@ -11,7 +11,7 @@ import numpy as np
 
 from thud import _core
 from thud.base.errors import InputError, NumericalError
-from thud.base.note import Note
+from thud.base.note import Note, library_name
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -83,17 +83,11 @@ def _collect(status: int, handle: int, n_byte: int, n_value: int) -> Bundle:
         if "group" in answer:
             subject = ".".join(filter(None, (answer["group"], answer["key"])))
             value, low, high, *is_open = answer.get("range", [math.nan] * 3 + [0.0] * 2)
-            others = {"name": _name(subject), "text": answer["problem"]}
+            others = {"name": library_name(subject), "text": answer["problem"]}
             others |= dict(zip(("low_open", "high_open"), is_open, strict=True))
             note = Note("refused", subject, value, low, high, others=others)
         raise _ERRORS.get(status, NumericalError)(answer["message"], note)
     return answer
-
-
-def _name(subject: str) -> str:
-    """Return how messages of the library call a group, or a group and a key."""
-    group, _, key = subject.partition(".")
-    return f"&{group}: {key}".rstrip()
 
 
 def notes(group: Mapping[str, Any]) -> tuple[Note, ...]:
@@ -107,7 +101,7 @@ def notes(group: Mapping[str, Any]) -> tuple[Note, ...]:
         for name in ("value", "low", "high")
     )
     return tuple(
-        Note(code, subject, value, low, high, others={"name": _name(subject), "text": text})
+        Note(code, subject, value, low, high, others={"name": library_name(subject), "text": text})
         for code, subject, text, value, low, high in zip(*words, *numbers, strict=True)
     )
 

@@ -7,12 +7,13 @@ import warnings
 from abc import ABC, abstractmethod
 from contextlib import contextmanager
 from html import escape
+from importlib import import_module
 from itertools import chain, repeat
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from thud.base.checks import shown_text
+from thud.base.checks import refuse, shown_text
 from thud.base.errors import ReportWarning
 from thud.base.extras import data_frame, require_extra
 from thud.base.files import replace_file
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
 
     import pandas as pd
     import xarray as xr
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
@@ -38,11 +40,45 @@ _SYMBOL = re.compile(r"\b([CL])_(FE|I|iA,Fmax|n,w)\b")
 
 
 class Displayed(Immutable, ABC):
-    """Base of results: one line, and a table of texts; HTML has both."""
+    """Base of results: a line and a table of texts, which HTML has both, figure, data and file."""
+
+    # Module and function of `thud.plot` that draws a result; matplotlib is slow to import.
+    drawn_by: ClassVar[str] = ""
+
+    @property
+    def notes(self) -> tuple[Note, ...]:
+        """Facts that a user of the result should know."""
+        return ()
 
     @abstractmethod
     def rows(self) -> Sequence[Sequence[str]]:
         """Return header and rows of the table."""
+
+    @abstractmethod
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the result as a table; raise InputError if pandas is not installed."""
+
+    @abstractmethod
+    def to_xarray(self) -> xr.Dataset:
+        """Return the result with units; raise InputError if xarray is not installed."""
+
+    def plot(self, ax: Axes | None = None) -> Figure:
+        """Draw the result in a new figure, or its main panel in the stated axes.
+
+        Return the figure; raise InputError for a result without one, such as a rating.
+        """
+        if not self.drawn_by:
+            refuse(f"{self!r} has no figure", "its table")
+        module, function = self.drawn_by.split(".")
+        figure: Figure = getattr(import_module(f"thud.plot.{module}"), function)(self, ax)
+        return figure
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the table to a CSV file, which is replaced as a whole; an OSError names its path.
+
+        Raise InputError if pandas is not installed.
+        """
+        replace_file(path, self.to_dataframe().to_csv().encode())
 
     def _repr_html_(self) -> str:
         rows = zip(chain(["th"], repeat("td")), self.rows(), strict=False)
@@ -60,11 +96,6 @@ class Tabulated(Displayed):
     @abstractmethod
     def columns(self) -> Columns:
         """Return numbers or texts, shape (n_row,), and their format by titles with units."""
-
-    @property
-    def notes(self) -> tuple[Note, ...]:
-        """Facts that a user of the result should know."""
-        return ()
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text; the text of NaN is empty."""

@@ -39,12 +39,19 @@ class Note:
 
     @property
     def message(self) -> str:
-        """The fact as a sentence, after its subject if it has one."""
-        return f"{self.subject}: {self}" if self.subject else str(self)
+        """The fact as a sentence, after its subject if it has one that it does not name itself."""
+        is_named = self.others.get("name") == library_name(self.subject)
+        return f"{self.subject}: {self}" if self.subject and not is_named else str(self)
 
     def __str__(self) -> str:
         """Return the fact as a sentence, without its subject."""
         return sentence([self])
+
+
+def library_name(subject: str) -> str:
+    """Return how messages of the library call a group, or a group and a key."""
+    group, _, key = subject.partition(".")
+    return f"&{group}: {key}".rstrip()
 
 
 def of_part(part: str, notes: Iterable[Note]) -> list[Note]:
@@ -89,5 +96,7 @@ def decimal_text(value: float | str, form: str) -> str:
     >>> decimal_text(2e4, ".4g"), decimal_text(2.5e-5, ".2g")
     ('20000', '0.000025')
     """
+    if isinstance(value, str):
+        return value
     text = format(value, form)
-    return text if isinstance(value, str) or "e" not in text else f"{Decimal(text):f}"
+    return text if "e" not in text else f"{Decimal(text):f}"

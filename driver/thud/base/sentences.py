@@ -11,6 +11,9 @@ PROCESSING = {
     "press_included": "unknown, in the intervals as far as the curve does not show it: {unknowns}",
     "not_visible": "not in the intervals, and not visible: {cause} changes {changes}",
     "widened": "intervals widened {value:.3g} times, see the warnings",
+    # Surrogates.
+    "surrogate": "{accuracy}",
+    "undecided": "{accuracy}; it leaves {value:.0f} of {high:.0f} verdicts undecided",
     # Reading of files.
     "sign_stated": "the sign was changed: polarity = '{polarity}'",
     "sign_changed": "the sign was changed: the largest peak, {value:.4g} {unit}, is negative",

@@ -199,7 +199,7 @@ def compare_cases(options: argparse.Namespace) -> int:
     items = comparison.read_all(options.cases)
     progress = shows_progress(quiet=options.quiet)
     page = comparison.compare(items, options.force, options.source, progress=progress)
-    return finish(options, results, page.files(), format_rows(page.rows()), page.warnings)
+    return finish(options, results, page.files(), format_rows(page.rows()), page.notes)
 
 
 # Help of the options that choose formats.
@@ -234,8 +234,9 @@ def run_export(options: argparse.Namespace) -> int:
     formats = (force_files.EXPORTS[kind] for kind in chosen)
     contents = {f"{force.name}{ending}": make(force) for ending, make in formats}
     inputs = options.source, options.config
+    warnings = (note for note in source.notes if note.is_warning)
     results = results_of(options, f"{force.name}_export", inputs, force.name)
-    return finish(options, results, contents, "\n".join(contents), source.warnings)
+    return finish(options, results, contents, "\n".join(contents), warnings)
 
 
 def _read_source(path: str, config: str | None) -> ImpactResult:

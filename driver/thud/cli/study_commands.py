@@ -63,7 +63,7 @@ def _print(options: argparse.Namespace, result: SampleResult | Fit, folder: Path
     """Print results, their notes and their directory."""
     if not options.quiet:
         print_results(result.table())
-    print_notes(f"{options.study}: {text}" for text in (*result.warnings, *result.notes))
+    print_notes(f"{options.study}: {text}" for text in result.notes)
     if not options.quiet:
         print_path("Results", folder)
 

@@ -7,17 +7,17 @@ import os
 import time
 import warnings
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain, combinations, count
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from tqdm import tqdm
 
 from thud.base._schema import LIMITS, QUANTITIES, SAMPLE_QUANTITIES, VERDICTS
 from thud.base.checks import refuse, refuse_value, require_choice, require_kind
-from thud.base.display import Displayed
+from thud.base.display import Tabulated, column_rows
 from thud.base.errors import PlausibilityWarning, ThudError
 from thud.base.files import Results
 from thud.case.case import Case, read_case
@@ -26,14 +26,15 @@ from thud.impact.impact import Impact
 from thud.level.assessment import ImpactOrRecording
 from thud.level.levels import FORCES, SOURCES
 from thud.plot.impact_figures import common_source
-from thud.plot.pages import comparison_figure, comparison_html
+from thud.plot.pages import comparison_html
 from thud.plot.save_figures import page_files
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from thud.base._schema import LevelsForce, LimitsSource
-    from thud.level.assessment import Criterion
+    from thud.base.display import Columns
+    from thud.base.key import Quantity
+    from thud.base.note import Note
+    from thud.level.assessment import Criterion, Verdict
     from thud.recordings.recording import ImpactResult
 
 # Endings of namelist files; all other files are read as recordings.
@@ -49,8 +50,8 @@ _OTHERS = [
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Comparison(Displayed):
-    """Impacts of the same drop, side by side.
+class Comparison(Tabulated):
+    """Impacts of the same drop, in columns of a table.
 
     Attributes
     ----------
@@ -64,76 +65,82 @@ class Comparison(Displayed):
         Impact source whose limits apply.
     """
 
+    drawn_by: ClassVar[str] = "pages.draw_comparison"
+
     impacts: dict[str, ImpactResult]
     run_times: dict[str, float]
     force: LevelsForce | None = None
     source: LimitsSource = "rubber_ball"
 
     @property
-    def warnings(self) -> list[str]:
-        """Warnings of all impacts, each after the name of its impact."""
-        return [
-            f"{name}: {warning}"
-            for name, impact in self.impacts.items()
-            for warning in impact.warnings
-        ]
+    def notes(self) -> tuple[Note, ...]:
+        """Warnings of all impacts; their subjects begin with the name of the impact."""
+        notes = [(name, note) for name, impact in self.impacts.items() for note in impact.notes]
+        return tuple(
+            replace(note, subject=f"{name}, {note.subject}".removesuffix(", "))
+            for name, note in notes
+            if note.is_warning
+        )
 
     def __repr__(self) -> str:
         """Return the names of the compared impacts."""
         return f"<Comparison: {', '.join(self.impacts)}>"
 
-    def rows(self) -> list[tuple[str, ...]]:
-        """Return rows of text: names, force, method, criteria, quantities, times, verdicts.
-
-        Each impact has a column; the last column has the limits.
-        """
-        columns = [self._column(name) for name in self.impacts]
-        criteria = next(iter(self.impacts.values())).assess(self.source, self.force).criteria
-        limits = {criterion.quantity.label: criterion.shown_limits for criterion in criteria}
-        rows: list[tuple[str, ...]] = [
-            ("", *self.impacts, f"limits, {self.source.replace('_', ' ')}")
-        ]
-        for title in columns[0]:
-            cells = [column[title] for column in columns]
-            if any(cells):
-                rows.append((title, *cells, limits.get(title, "")))
-        return rows
-
-    def _column(self, name: str) -> dict[str, str]:
-        """Return the cells of an impact by their titles."""
-        impact, seconds = self.impacts[name], self.run_times.get(name)
-        verdict = impact.assess(self.source, self.force)
-        peak, others = QUANTITIES["peak_force"], map(QUANTITIES.__getitem__, _OTHERS)
+    def columns(self) -> Columns:
+        """Return force, method, criteria, quantities, times and verdicts; a row for each impact."""
+        impacts = self.impacts.values()
+        verdicts = self._verdicts()
+        values: dict[Quantity, list[float]] = {
+            criteria[0].quantity: [criterion.value for criterion in criteria]
+            for criteria in zip(*(verdict.criteria for verdict in verdicts), strict=True)
+        }
+        forms = {quantity: f"z.{quantity.decimals}f" for quantity in values}
+        values[QUANTITIES["peak_force"]] = [impact.peak(self.force) for impact in impacts]
+        for other in map(QUANTITIES.__getitem__, _OTHERS):
+            values[other] = [impact.quantity(other.name) for impact in impacts]
+        times = [1e3 * self.run_times.get(name, math.nan) for name in self.impacts]
         return {
-            "assessed force": impact.assessed_force(self.force),
-            "method of levels": impact.case.levels.method,
-            **{criterion.quantity.label: _cell(criterion) for criterion in verdict.criteria},
-            peak.label: peak.show(impact.peak(self.force)),
-            **{other.label: other.show(impact.quantity(other.name)) for other in others},
-            "computing time, ms": f"{1e3 * seconds:.3g}" if seconds else "",
-            "verdict": verdict.conforms,
+            "name": ([*self.impacts], ""),
+            "assessed force": ([impact.assessed_force(self.force) for impact in impacts], ""),
+            "method of levels": ([impact.case.levels.method for impact in impacts], ""),
+            **{
+                quantity.label: (quantity.display_scale * np.array(row), forms.get(quantity, ".4g"))
+                for quantity, row in values.items()
+            },
+            "computing time, ms": (times, ".3g"),
+            "verdict": ([v.conforms for v in verdicts], ""),
         }
 
-    def plot(self) -> Figure:
-        """Draw forces and levels."""
-        return comparison_figure(self.impacts, self.force, self.source)
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return rows of text without empty ones: a column for each impact, and the limits."""
+        criteria = zip(*(verdict.criteria for verdict in self._verdicts()), strict=True)
+        assessed = {entries[0].quantity.label: entries for entries in criteria}
+        rows = [("", *self.impacts, f"limits, {self.source.replace('_', ' ')}")]
+        for title, *cells in [*zip(*column_rows(self.columns()), strict=True)][1:]:
+            entries = assessed.get(title, ())
+            texts = map(_cell, entries) if entries else cells
+            rows.append((title, *texts, entries[0].shown_limits if entries else ""))
+        return [row for row in rows if any(row[1:-1])]
+
+    def _verdicts(self) -> list[Verdict]:
+        """Return the verdict on each impact."""
+        return [impact.assess(self.source, self.force) for impact in self.impacts.values()]
 
     def html(self) -> str:
         """Return a page with interactive plots and the table as self-contained HTML."""
-        return comparison_html(self.impacts, self.force, self.source, self.rows())
+        return comparison_html(self)
 
     def files(self) -> dict[str, bytes]:
         """Return ``comparison.svg`` and ``comparison.html`` by name."""
         return page_files("comparison", self.plot, self.html())
 
-    def save(self, directory: str | os.PathLike[str], *, replace: bool = False) -> list[Path]:
-        """Write the contents of `files` into a directory of their own; return the paths.
+    def save(self, path: str | os.PathLike[str], *, replace: bool = False) -> None:
+        """Write `files` into a directory of their own, which is replaced as a whole.
 
-        A directory is replaced as a whole: one that holds results of something else only if
-        `replace` is true. Raise InputError if it holds any other file, and OSError if a file cannot
-        be written.
+        Results of something else are replaced only if `replace` is true. Raise InputError if the
+        directory holds any other file, and OSError if a file cannot be written.
         """
-        return Results(Path(directory), "compare", replace=replace).write(self.files())
+        Results(Path(path), "compare", replace=replace).write(self.files())
 
 
 def _cell(criterion: Criterion) -> str:
@@ -185,7 +192,7 @@ def compare(
     Warns
     -----
     PlausibilityWarning
-        For each of `Comparison.warnings`.
+        For each of `Comparison.notes`.
     """
     if force is not None:
         require_choice("force", force, FORCES)
@@ -207,8 +214,8 @@ def compare(
     _require_same_drop(solved)
     limits = common_source(solved, source)
     result = Comparison(solved, run_times, force, limits)
-    for warning in result.warnings:
-        warnings.warn(warning, PlausibilityWarning, stacklevel=2)
+    for note in result.notes:
+        warnings.warn(note.message, PlausibilityWarning, stacklevel=2)
     return result
 
 

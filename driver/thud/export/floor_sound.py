@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from functools import lru_cache
 from operator import itemgetter
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 from scipy.signal import butter, lfilter, resample, sosfilt
@@ -25,8 +25,6 @@ from thud.recordings.filters import band_filters
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.base.display import Columns
@@ -108,6 +106,8 @@ class FloorSound(Tabulated):
         position, in others those of the prediction.
     """
 
+    drawn_by: ClassVar[str] = "room_figures.draw_floor_sound"
+
     name: str
     prediction: RoomPrediction
     position: tuple[int, int] | None
@@ -139,12 +139,6 @@ class FloorSound(Tabulated):
             "sound, dB": (self.level.third, ".1f"),
             "reference, dB": (self.reference.third, ".1f"),
         }
-
-    def plot(self, ax: Axes | None = None) -> Figure:
-        """Draw the levels, in a new figure or the stated axes."""
-        from thud.plot.room_figures import draw_floor_sound
-
-        return draw_floor_sound(self, ax)
 
 
 def new_floor_sound(

@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -27,8 +27,6 @@ from thud.recordings.recording import Recording
 if TYPE_CHECKING:
     import os
 
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.base.display import Columns
@@ -70,6 +68,8 @@ class BlockedForce(Tabulated):
     notes : tuple of Note
         Processing of the force.
     """
+
+    drawn_by: ClassVar[str] = "impact_figures.draw_blocked_force"
 
     is_curve = True
     name: str
@@ -123,12 +123,6 @@ class BlockedForce(Tabulated):
     def columns(self) -> Columns:
         """Return the force over time since first touch."""
         return {"time, s": (self.time, ".5f"), "force, N": (self.force, "z.1f")}
-
-    def plot(self, ax: Axes | None = None) -> Figure:
-        """Draw the force over time since first touch, in a new figure or the stated axes."""
-        from thud.plot.impact_figures import draw_blocked_force
-
-        return draw_blocked_force(self, ax)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the force to a file, replacing an existing file.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Mapping
 
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.base.display import Columns
@@ -61,6 +59,8 @@ class RoomSound(Tabulated):
     starts : ndarray, shape (n_impact,)
         Times of the impacts, s.
     """
+
+    drawn_by: ClassVar[str] = "room_figures.draw_sound"
 
     sounds: tuple[FloorSound, ...]
     pressure: Array
@@ -97,12 +97,6 @@ class RoomSound(Tabulated):
             **{title: (row, ".1f") for title, row in zip(titles, levels, strict=True)},
             "deviation, dB": (deviations, ".1f"),
         }
-
-    def plot(self, ax: Axes | None = None) -> Figure:
-        """Draw the sound pressure over time, in a new figure or the stated axes."""
-        from thud.plot.room_figures import draw_sound
-
-        return draw_sound(self, ax)
 
     def wav(self) -> bytes:
         """Return the content of the WAV file, of 24 bit; raise InputError without soundfile."""

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from tqdm import tqdm
 
 from thud.base._schema import RATED_BANDS, RATINGS
 from thud.base.checks import refuse, require_kind, require_mapping
-from thud.base.display import Tabulated
+from thud.base.display import Tabulated, column_rows
 from thud.base.errors import ThudError
 from thud.base.files import Results
 from thud.case.case import Case
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Iterable, Mapping
 
-    from matplotlib.figure import Figure
-
     from thud.base.display import Columns
     from thud.base.note import Note
 
@@ -41,6 +39,8 @@ class FloorComparison(Tabulated):
     predictions : dict of str to RoomPrediction
         The predictions by name.
     """
+
+    drawn_by: ClassVar[str] = "pages.draw_floors"
 
     predictions: dict[str, RoomPrediction]
 
@@ -93,17 +93,7 @@ class FloorComparison(Tabulated):
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text, with a column for each floor, without empty rows."""
-        rows = []
-        for title, (values, form) in self.columns().items():
-            cells = [value if isinstance(value, str) else f"{value:{form}}" for value in values]
-            rows.append((title, *("" if cell == "nan" else cell for cell in cells)))
-        return [row for row in rows if any(row[1:])]
-
-    def plot(self) -> Figure:
-        """Draw ratings, levels and what they follow from."""
-        from thud.plot.pages import draw_floors
-
-        return draw_floors(self)
+        return [row for row in zip(*column_rows(self.columns()), strict=True) if any(row[1:])]
 
     def save(self, path: str | os.PathLike[str], *, replace: bool = False) -> None:
         """Write `files` into a directory of their own, which is replaced as a whole.

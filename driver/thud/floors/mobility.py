@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -20,8 +20,6 @@ from thud.level.levels import finite_array
 if TYPE_CHECKING:
     import os
 
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
     from thud.base.display import Columns
@@ -51,6 +49,8 @@ class Mobility(Tabulated):
     point : tuple of float or None
         Position along length and width of the floor, m; None: at the source.
     """
+
+    drawn_by: ClassVar[str] = "floor_figures.draw_mobility"
 
     is_curve = True
     frequency: NDArray[np.float64]
@@ -113,12 +113,6 @@ class Mobility(Tabulated):
             "real, m/(N s)": (self.values.real, ".4g"),
             "imaginary, m/(N s)": (self.values.imag, ".4g"),
         }
-
-    def plot(self, ax: Axes | None = None) -> Figure:
-        """Draw magnitude and real part against frequency, in a new figure or the stated axes."""
-        from thud.plot.floor_figures import draw_mobility
-
-        return draw_mobility(self, ax)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the table to a CSV file, which `read_mobility` reads."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import f90nml
 import numpy as np
@@ -23,7 +23,6 @@ from thud.level.levels import get_bands
 if TYPE_CHECKING:
     import os
 
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.base.display import Columns
@@ -56,6 +55,8 @@ class MobilityFit(Tabulated):
     free_error : float
         Relative error, root mean square, of the fit before it was made passive.
     """
+
+    drawn_by: ClassVar[str] = "floor_figures.draw_mobility_fit"
 
     measured: Mobility
     floor: MeasuredMobility
@@ -120,12 +121,6 @@ class MobilityFit(Tabulated):
         for group in ("floor", self.floor.name):
             groups[group] = case[group]
         return f"! Mobility {self.name}, fitted: relative error {self.error:.2g}.\n{groups}\n"
-
-    def plot(self) -> Figure:
-        """Draw the measured mobility and the fit."""
-        from thud.plot.floor_figures import draw_mobility_fit
-
-        return draw_mobility_fit(self)
 
     def _errors(self) -> Array:
         """Return the relative errors at the frequency points."""

@@ -8,7 +8,7 @@ support is not known are simply supported.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -20,8 +20,6 @@ from thud.case.case import case_text
 from thud.floors.prediction import RoomPrediction, predict_level
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
     from thud.base.display import Columns
@@ -69,6 +67,8 @@ class ModalRoom(Tabulated):
         Samples of the pressure per second, Hz.
     """
 
+    drawn_by: ClassVar[str] = "room_figures.draw_modal_room"
+
     prediction: RoomPrediction
     size: tuple[float, float, float]
     frequency: Array
@@ -99,12 +99,6 @@ class ModalRoom(Tabulated):
             "minimum, dB": (self.level.min(axis=(0, 1)), ".1f"),
             "maximum, dB": (self.level.max(axis=(0, 1)), ".1f"),
         }
-
-    def plot(self, ax: Axes | None = None) -> Figure:
-        """Draw the levels of all positions."""
-        from thud.plot.room_figures import draw_modal_room
-
-        return draw_modal_room(self, ax)
 
     def __repr__(self) -> str:
         """Return the size of the room and the numbers of positions and modes."""

@@ -10,7 +10,7 @@ import math
 import unicodedata
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -26,8 +26,6 @@ from thud.recordings.table import read_table
 if TYPE_CHECKING:
     import os
 
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
@@ -95,6 +93,8 @@ class RoomLevels(Tabulated):
     volume : float or None
         Volume of the room, m3.
     """
+
+    drawn_by: ClassVar[str] = "room_figures.room_levels"
 
     name: str
     bands: BandSet
@@ -196,12 +196,6 @@ class RoomLevels(Tabulated):
         return {
             title: (values, form) for title, (values, form) in columns.items() if values is not None
         }
-
-    def plot(self, ax: Axes | None = None) -> Figure:
-        """Draw the levels of positions, their mean, the standardized levels and the background."""
-        from thud.plot.room_figures import room_levels
-
-        return room_levels(self, ax)
 
     def __repr__(self) -> str:
         """Return the single-number ratings."""

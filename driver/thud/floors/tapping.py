@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeGuard
+from typing import TYPE_CHECKING, ClassVar, TypeGuard
 
 import numpy as np
 
@@ -15,8 +15,6 @@ from thud.case.case import Case, case_text
 from thud.case.constructions import Construction, with_floor
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.base._schema import FloorOptions
@@ -51,6 +49,8 @@ class TappingLevel(Tabulated):
         L_n, dB re 20 uPa, for an absorption of 10 m2.
     """
 
+    drawn_by: ClassVar[str] = "room_figures.draw_tapping"
+
     frequency: NDArray[np.float64]
     level: NDArray[np.float64]
 
@@ -79,12 +79,6 @@ class TappingLevel(Tabulated):
     def columns(self) -> Columns:
         """Return the levels."""
         return {"band, Hz": (self.frequency, "g"), "L_n, dB": (self.level, ".1f")}
-
-    def plot(self, ax: Axes | None = None) -> Figure:
-        """Draw the levels and the shifted reference curve."""
-        from thud.plot.room_figures import draw_tapping
-
-        return draw_tapping(self, ax)
 
     def __repr__(self) -> str:
         """Return weighted level and adaptation term."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from thud.base._schema import Ball, Compression
 from thud.base.bridge import ask, without_units
@@ -12,8 +12,6 @@ from thud.case.case import Case, case_text, new_model
 
 if TYPE_CHECKING:
     import numpy as np
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.base._schema import CompressionGas, ModelName, ModelOptions
@@ -35,6 +33,8 @@ class CompressionCurve(Tabulated):
         Force on each plate, N.
     """
 
+    drawn_by: ClassVar[str] = "ball_figures.compression"
+
     is_curve = True
     case: Case
     deflection: NDArray[np.float64]
@@ -49,12 +49,6 @@ class CompressionCurve(Tabulated):
     def columns(self) -> Columns:
         """Return the columns of ``compression.csv``."""
         return {"deflection, m": (self.deflection, ".4g"), "force, N": (self.force, ".2f")}
-
-    def plot(self, ax: Axes | None = None) -> Figure:
-        """Draw the force against the deflection, in a new figure or the stated axes."""
-        from thud.plot.ball_figures import compression
-
-        return compression({"": self}, ax)
 
 
 def compress(

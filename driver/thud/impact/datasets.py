@@ -22,6 +22,7 @@ from thud.level.levels import FORCES
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
+    import pandas as pd
     import xarray as xr
     from numpy.typing import NDArray
 
@@ -125,8 +126,9 @@ def impact_dataset(
     conforms = impact.assess().conforms == VERDICTS[0]
     variables["conforms"] = ((), conforms, attributes(RESULTS["conforms"]))
     coordinates = {"time": _time(impact.time), **_frequencies(BANDS)}
-    warnings = {"warnings": "\n".join(impact.warnings)}
-    return xr.Dataset(variables, coordinates, {**provenance, **warnings}).copy(deep=True)
+    texts = (note.message for note in impact.notes if note.is_warning)
+    stated = {**provenance, "warnings": "\n".join(texts)}
+    return xr.Dataset(variables, coordinates, stated).copy(deep=True)
 
 
 def ensemble_dataset(ensemble: Ensemble) -> xr.Dataset:
@@ -144,6 +146,19 @@ def ensemble_dataset(ensemble: Ensemble) -> xr.Dataset:
             attrs = _attributes("N", f"{force} force")
             variables[f"{force}_force"] = (("sample", "time"), values, attrs)
     return xr.Dataset(variables, coordinates, case_attributes(ensemble.case)).copy(deep=True)
+
+
+def sample_table(dataset: xr.Dataset) -> pd.DataFrame:
+    """Return a row for each sample of a dataset, without forces, and a column for each band, Hz."""
+    columns: dict[str, xr.DataArray] = {}
+    for name, variable in dataset.drop_dims("time", errors="ignore").data_vars.items():
+        bands = next((bands for bands in FREQUENCIES if bands in variable.dims), None)
+        for band in dataset[bands].to_numpy() if bands else ():
+            columns[f"{name}_{band:g}"] = variable.sel({bands: band}, drop=True)
+        if not bands:
+            columns[str(name)] = variable
+    table = dataset[[]].drop_vars([*FREQUENCIES, "time"], errors="ignore").assign(columns)
+    return table.to_dataframe()
 
 
 def sample_variables(results: Mapping[str, NDArray[Any]]) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -23,7 +23,13 @@ from thud.base.display import Displayed
 from thud.base.immutable import freeze
 from thud.case.case import Case, case_text, impact_only, new_model
 from thud.case.keys import find_key
-from thud.impact.datasets import NO_ERRORS, RESULTS, ensemble_dataset, sample_warnings
+from thud.impact.datasets import (
+    NO_ERRORS,
+    RESULTS,
+    ensemble_dataset,
+    sample_table,
+    sample_warnings,
+)
 from thud.level.levels import FORCES, peak_count
 
 if TYPE_CHECKING:
@@ -88,6 +94,8 @@ class Ensemble(SampleQuantities, Displayed):
     room_rating : ndarray, shape (n_sample,), or None
         The rating that the room asks for by its key `rating`, dB, not rounded; None without a room.
     """
+
+    drawn_by: ClassVar[str] = "sweep_figures.draw_sweep"
 
     case: Case
     parameters: dict[str, NDArray[np.generic]]
@@ -163,6 +171,13 @@ class Ensemble(SampleQuantities, Displayed):
         Raise InputError if xarray is not installed.
         """
         return ensemble_dataset(self)
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return a row for each sample, without forces; levels have a column for each band, Hz.
+
+        Raise InputError if xarray is not installed.
+        """
+        return sample_table(self.to_xarray())
 
 
 def solve_many(  # noqa: PLR0913 - samples, and how to compute them

@@ -3,27 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from thud.base.bridge import ask
 from thud.base.checks import require_choice, require_pair
-from thud.base.display import column_rows
-from thud.base.immutable import Immutable
+from thud.base.display import Tabulated, column_rows
 from thud.case.case import Case, case_text
 from thud.impact.impact import Impact
 from thud.level.levels import BANDWIDTHS, force_exposure_levels
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet, FloorOptions
+    from thud.base.display import Columns
 
 
-@dataclass(frozen=True, eq=False)
-class FloorEnergy(Immutable):
+@dataclass(frozen=True, eq=False, repr=False)
+class FloorEnergy(Tabulated):
     """Energy that a force transfers to a floor, in bands.
 
     Attributes
@@ -39,10 +38,24 @@ class FloorEnergy(Immutable):
         motion of the floor: their difference shows the error of the time steps.
     """
 
+    drawn_by: ClassVar[str] = "floor_figures.draw_energy"
+
     frequency: NDArray[np.float64]
     energy: NDArray[np.float64]
     conductance: NDArray[np.float64]
     total: float
+
+    def __repr__(self) -> str:
+        """Return the energy in all frequencies."""
+        return f"<FloorEnergy: {1e3 * self.total:.3g} mJ in {len(self.frequency)} bands and beyond>"
+
+    def columns(self) -> Columns:
+        """Return energy and conductance."""
+        return {
+            "band, Hz": (self.frequency, "g"),
+            "energy, J": (self.energy, ".3g"),
+            "conductance, m/(N s)": (self.conductance, ".3g"),
+        }
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -61,6 +74,8 @@ class FloorImpact(Impact):
     floor_work : float
         Energy that the source transfers to the floor, J.
     """
+
+    drawn_by: ClassVar[str] = "floor_figures.draw_floor"
 
     blocked_force: NDArray[np.float64]
     floor_displacement: NDArray[np.float64]
@@ -139,9 +154,3 @@ class FloorImpact(Impact):
             "floor_velocity_m_per_s": self.floor_velocity,
             **{f"point_{i}_velocity_m_per_s": velocity for i, velocity in points},
         }
-
-    def plot(self) -> Figure:
-        """Return a figure of contact and blocked force, their levels and the floor mobility."""
-        from thud.plot.floor_figures import draw_floor
-
-        return draw_floor(self)

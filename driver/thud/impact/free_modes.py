@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -21,7 +21,6 @@ from thud.level.rating import POSITIVE
 if TYPE_CHECKING:
     import os
 
-    from matplotlib.figure import Figure
     from numpy.typing import ArrayLike, NDArray
 
     from thud.base.bridge import Bundle
@@ -55,6 +54,8 @@ class FreeModes(Tabulated):
         Warnings on implausible input.
     """
 
+    drawn_by: ClassVar[str] = "ball_figures.mode_shapes"
+
     ball: Ball
     frequency: NDArray[np.float64]
     harmonic: NDArray[np.int32]
@@ -75,12 +76,6 @@ class FreeModes(Tabulated):
         """
         names = (f"mode {i}, {f:.3f} Hz" for i, f in enumerate(self.frequency, 1))
         write_vtu(path, self.start, dict(zip(names, self.shape, strict=True)))
-
-    def plot(self) -> Figure:
-        """Draw the mode shapes."""
-        from thud.plot.ball_figures import mode_shapes
-
-        return mode_shapes(self)
 
     def columns(self) -> Columns:
         """Return frequencies, harmonics and participations."""

@@ -4,25 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from thud.base._schema import QUANTITIES, ImpactQuantities
 from thud.base.checks import require_choice
 from thud.base.extras import data_frame
-from thud.base.files import replace_file
 from thud.impact.contact_time import contact_span
 from thud.level.assessment import ImpactOrRecording, assess_levels
 from thud.level.estimate import Estimate
 from thud.level.levels import FORCES, force_exposure_levels, peak_count
 
 if TYPE_CHECKING:
-    import os
-
     import pandas as pd
     import xarray as xr
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet, LevelsForce, LevelsMethod, LimitsSource
@@ -70,6 +66,8 @@ class Impact(ImpactQuantities, ImpactOrRecording):
         Level in the room of the case; None without a room or if the results were read from files.
     """
 
+    drawn_by: ClassVar[str] = "impact_figures.overview"
+
     case: Case
     time: NDArray[np.float64]
     deflection: NDArray[np.float64]
@@ -79,8 +77,8 @@ class Impact(ImpactQuantities, ImpactOrRecording):
     components: dict[str, NDArray[np.float64]]
     model_histories: dict[str, NDArray[np.float64]]
     model_quantities: dict[str, float]
-    notes: tuple[Note, ...]
-    motion: Motion | None
+    notes: tuple[Note, ...] = ()
+    motion: Motion | None = None
     on_floor: FloorImpact | None = None
     room_level: RoomLevel | None = None
 
@@ -124,14 +122,9 @@ class Impact(ImpactQuantities, ImpactOrRecording):
             f"e {self.restitution:.3f}, peak {self.peak():.0f} N>"
         )
 
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Sentences of `notes`."""
-        return tuple(map(str, self.notes))
-
     def rows(self) -> list[tuple[str, ...]]:
         """Return header and rows of text."""
-        warnings = [("warning", warning, "", "", "") for warning in self.warnings]
+        warnings = [("warning", str(note), "", "", "") for note in self.notes]
         return [*self.assess().rows(), *warnings]
 
     def force(self, kind: LevelsForce | None = None) -> NDArray[np.float64]:
@@ -200,12 +193,6 @@ class Impact(ImpactQuantities, ImpactOrRecording):
             source or self.case.limits.source,
         )
 
-    def plot(self) -> Figure:
-        """Return a figure of the assessed force and its octave levels."""
-        from thud.plot.impact_figures import overview
-
-        return overview(self)
-
     def to_xarray(self) -> xr.Dataset:
         """Return histories, levels of both forces and scalars, with units and provenance.
 
@@ -223,10 +210,6 @@ class Impact(ImpactQuantities, ImpactOrRecording):
         Raise InputError if pandas is not installed.
         """
         return data_frame(self.histories(), self.time)
-
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the table of `to_dataframe` as CSV, replacing an existing file."""
-        replace_file(path, self.to_dataframe().to_csv().encode())
 
     def histories(self) -> dict[str, NDArray[np.float64]]:
         """Return the histories, shape (n_sample,), by names that end with units."""

@@ -6,7 +6,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -27,8 +27,6 @@ from thud.level.estimate import NORMAL_FACTOR, NUMERICAL_ERROR, Estimate
 from thud.level.levels import BANDWIDTHS, SOURCES, get_bands
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.base._schema import LimitsSource
@@ -250,6 +248,8 @@ class Verdict(Outcome, Tabulated):
         How the drops were made.
     """
 
+    drawn_by: ClassVar[str] = "verdict_figure.draw_verdict"
+
     source: LimitsSource
     criteria: tuple[Criterion, ...]
     counts: tuple[int, int] | None = None
@@ -300,12 +300,6 @@ class Verdict(Outcome, Tabulated):
         }  # fmt: skip
         columns = zip(titles.items(), *rows, total, strict=True)
         return {title: (values, form) for (title, form), *values in columns}
-
-    def plot(self, ax: Axes | None = None) -> Figure | Axes:
-        """Draw each criterion in its range; return the figure, or the axes that it is drawn on."""
-        from thud.plot.verdict_figure import draw_verdict
-
-        return draw_verdict(self, ax)
 
 
 class ImpactOrRecording(Displayed):

@@ -27,38 +27,23 @@ from thud.plot.ball_figures import (
     mode_shapes as mode_shapes,
     motion as motion,
 )
-from thud.plot.fit_figures import draw_fit as draw_fit, target_and_fit as target_and_fit
 from thud.plot.floor_figures import (
     ball_impedances as ball_impedances,
-    draw_floor as draw_floor,
-    draw_mobility as draw_mobility,
-    draw_mobility_fit as draw_mobility_fit,
     plate_modes as plate_modes,
 )
 from thud.plot.impact_figures import (
     force_history as force_history,
     levels as levels,
 )
-from thud.plot.pages import comparison_figure as comparison_figure
 from thud.plot.recording_figures import (
     recording_forces as recording_forces,
     recording_levels as recording_levels,
 )
-from thud.plot.room_figures import (
-    draw_positions as draw_positions,
-    draw_prediction as draw_prediction,
-    room_levels as room_levels,
-)
+from thud.plot.room_figures import draw_positions
 from thud.plot.save_figures import (
     FORMATS as FORMATS,
     figure_files as figure_files,
     save as save,
-)
-from thud.plot.study_figures import (
-    draw_design as draw_design,
-    draw_sensitivity as draw_sensitivity,
-    draw_surrogate as draw_surrogate,
-    draw_uncertainty as draw_uncertainty,
 )
 from thud.plot.style import (
     COLORS as COLORS,
@@ -73,7 +58,6 @@ from thud.plot.style import (
     named,
     own_style as own_style,
 )
-from thud.plot.sweep_figures import draw_sweep as draw_sweep
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -118,12 +102,12 @@ def case_figures(
 
         with warn_if_not_drawn("the level in the room"):
             prediction = predict_level(impact)
-            draws["room"] = partial(draw_prediction, prediction)
+            draws["room"] = prediction.plot
             draws["room_positions"] = partial(draw_positions, prediction)
     if impact and impact.on_floor:
-        draws["floor"] = partial(draw_floor, impact.on_floor)
+        draws["floor"] = impact.on_floor.plot
     if modes:
-        draws["modes"] = partial(mode_shapes, modes)
+        draws["modes"] = modes.plot
     if curve:
         draws["compression"] = curve.plot
     if impact and isinstance(impact.case.floor, Plate | LaminateFloor | JoistFloor | ModalFloor):

@@ -23,6 +23,7 @@ from thud.plot.style import (
     add_colorbar,
     add_curves,
     empty_axes,
+    figure_of,
     finish,
     own_or,
     own_style,
@@ -165,10 +166,8 @@ def _draw_instant(axes: Axes, impact: Impact, i: int, scale: Normalize, depth: f
 def _add_key(axes: Axes, arrows: Quiver, impact: Impact) -> None:
     """Show the size of a round velocity beside the label of the colors."""
     velocity = float(f"{impact.impact_velocity:.1g}")
-    figure = axes.get_figure(root=True)
-    assert figure is not None  # noqa: S101 - the axes are new
     # In fractions of the figure: a key in inches would be lost if a notebook crops the figure.
-    x, y = (WIDTH - 0.52, 0.11) / figure.get_size_inches()
+    x, y = (WIDTH - 0.52, 0.11) / figure_of(axes).get_size_inches()
     axes.quiverkey(
         arrows, x, y, velocity, f"{velocity:g} m/s", labelpos="E", coordinates="figure",
         fontproperties={"size": "medium"},
@@ -176,17 +175,17 @@ def _add_key(axes: Axes, arrows: Quiver, impact: Impact) -> None:
 
 
 @own_style()
-def mode_shapes(modes: FreeModes) -> Figure:
+def mode_shapes(modes: FreeModes, ax: Axes | None = None) -> Figure:
     """Draw mode shapes as half sections, with the outline of the ball at rest (paper, figure 4).
 
-    The color is the displacement divided by its maximum.
+    The color is the displacement divided by its maximum. The axes of a user show the lowest mode.
     """
     require_kind("modes", modes, FreeModes)
-    figure, panels = panel_grid(len(modes.frequency), COLUMNS, 1.75)
+    figure, panels = panel_grid(len(modes.frequency), COLUMNS, 1.75, ax=ax)
     radius = modes.ball.outer_radius
     scale = Normalize(0, 1)
     for axes, frequency, harmonic, shape in zip(
-        panels, modes.frequency, modes.harmonic, modes.shape, strict=True
+        panels, modes.frequency, modes.harmonic, modes.shape, strict=ax is None
     ):
         _draw_section(axes, modes.start + AMPLITUDE * radius * shape, np.hypot(*shape.T).T, scale)
         for surface in (0, -1):
@@ -201,11 +200,14 @@ def mode_shapes(modes: FreeModes) -> Figure:
 
 
 @own_style()
-def compression(curves: Mapping[str, CompressionCurve], ax: Axes | None = None) -> Figure:
+def compression(
+    curves: CompressionCurve | Mapping[str, CompressionCurve], ax: Axes | None = None
+) -> Figure:
     """Draw forces, N, against the approach of the plates, mm, by their names in the legend.
 
     They are drawn in a new figure or the stated axes. Raise InputError if there are no curves.
     """
+    curves = {"": curves} if isinstance(curves, CompressionCurve) else curves
     require_mapping("curves", curves, "curves")
     for name, curve in curves.items():
         require_kind(name, curve, CompressionCurve)

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator, NullLocator, ScalarFormatter
 
 from thud.case.keys import humanize
+from thud.plot.ball_figures import compression
 from thud.plot.style import (
     BAND_NAMES,
     COLORS,
     FORCE_NAMES,
     GRAY,
     curve_style,
+    figure_of,
+    finish,
     legend_above,
     level_label,
     new_figure,
+    own_panels,
     own_style,
     tolerance_boxes,
 )
@@ -27,6 +32,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from thud.studies.compression_fit import CompressionFit
     from thud.studies.fitting.fit_result import Fit, FittedTarget
     from thud.studies.fitting.level_target import LevelComparison
 
@@ -48,7 +54,7 @@ def draw_fit(fit: Fit) -> dict[str, Figure]:
     Parameters that are not identifiable have no regions.
     """
     figures = {
-        f"fit{end}": target_and_fit(fit, number)
+        f"fit{end}": target_and_fit(fit, number=number)
         for number, end in enumerate(file_ends(len(fit.targets)), start=1)
     }
     if 1 < len(fit.names) <= MAX_PARAMETERS and np.isfinite(np.diag(fit.covariance)).all():
@@ -57,22 +63,19 @@ def draw_fit(fit: Fit) -> dict[str, Figure]:
 
 
 @own_style()
-def target_and_fit(fit: Fit, number: int = 1) -> Figure:
+def target_and_fit(fit: Fit, ax: Axes | None = None, number: int = 1) -> Figure:
     """Draw a target and the model, in kN against ms or in dB, and below it their difference."""
     target = fit.targets[number - 1]
-    deviation = fit.deviation_of(target)
-    figure = new_figure(3.6)
-    above, below = figure.subplots(2, 1, sharex=True, height_ratios=[2.2, 1])
-    below.axhline(0, color="0.45", linewidth=0.8)
-    if isinstance(target.comparison, ForceComparison):
-        _draw_force(target, deviation, above, below)
-    else:
-        _draw_levels(target, deviation, above, below)
-    figure.align_ylabels()
-    return figure
+    above, *below = own_panels(ax, 3.6, 2, sharex=True, height_ratios=[2.2, 1])
+    for axes in below:
+        axes.axhline(0, color="0.45", linewidth=0.8)
+    draw = _draw_force if isinstance(target.comparison, ForceComparison) else _draw_levels
+    draw(target, fit.deviation_of(target), above, below)
+    figure_of(above).align_ylabels()
+    return finish(above, ax)
 
 
-def _draw_force(fitted: FittedTarget, deviation: float, above: Axes, below: Axes) -> None:
+def _draw_force(fitted: FittedTarget, deviation: float, above: Axes, below: list[Axes]) -> None:
     """Draw record, fit with its background, and residual."""
     comparison = cast("ForceComparison", fitted.comparison)
     column = comparison.columns(fitted.impact, fitted.own)
@@ -86,25 +89,25 @@ def _draw_force(fitted: FittedTarget, deviation: float, above: Axes, below: Axes
     )
     fit = column["model_N"] + column["background_N"]
     above.plot(time, fit / 1e3, color=COLORS[1], linestyle="--", linewidth=1.1, label="Fit")
-    width = 2 * comparison.band_fraction * deviation
-    below.axhspan(-width, width, color=GRAY, linewidth=0)
-    below.plot(time, column["residual_N"], color=COLORS[6], linewidth=0.7)
     contact, touch = fitted.impact.contact_time, comparison.own_value(SHIFT, fitted.own)
     begin, end = touch - BEFORE * contact, touch + (1 + AFTER) * contact
-    below.set_xlim(
+    above.set_xlim(
         1e3 * max(begin, comparison.record.time[0]), 1e3 * min(end, comparison.record.time[-1])
     )
-    below.set_xlabel("Time, ms")
     above.set_ylabel(f"{FORCE_NAMES[comparison.kind].capitalize()}, kN")
-    below.set_ylabel("Fit − target, N")
+    [above, *below][-1].set_xlabel("Time, ms")
+    width = 2 * comparison.band_fraction * deviation
     limit = 1.1 * max(np.abs(column["residual_N"]).max(), width)
-    below.set_ylim(-limit, limit)
-    # A label in the lower panel would cover the curve.
-    above.fill_between([], [], color=GRAY, linewidth=0, label=f"Noise {band}, ±2σ")
-    legend_above(above)
+    for axes in below:
+        axes.axhspan(-width, width, color=GRAY, linewidth=0)
+        axes.plot(time, column["residual_N"], color=COLORS[6], linewidth=0.7)
+        axes.set_ylabel("Fit − target, N")
+        axes.set_ylim(-limit, limit)
+        # A label in the lower panel would cover the curve.
+        above.fill_between([], [], color=GRAY, linewidth=0, label=f"Noise {band}, ±2σ")
 
 
-def _draw_levels(fitted: FittedTarget, scale: float, above: Axes, below: Axes) -> None:
+def _draw_levels(fitted: FittedTarget, scale: float, above: Axes, below: list[Axes]) -> None:
     """Draw levels with their uncertainty times a scale, and the residuals of all quantities."""
     comparison = cast("LevelComparison", fitted.comparison)
     column = comparison.columns(fitted.impact, fitted.own)
@@ -120,19 +123,28 @@ def _draw_levels(fitted: FittedTarget, scale: float, above: Axes, below: Axes) -
     label = "Standard deviation of the target"
     tolerance_boxes(above, target - half, target + half, label, "Target")
     above.plot(x[:count], model, label="Fit", **curve_style(1, 4))
-    below.axhspan(-1, 1, color=GRAY, linewidth=0)
-    below.plot(x, residuals, **curve_style(1, 4) | {"linestyle": "none"})
-    limit = 1.2 * max(1.2, np.abs(residuals).max())
-    below.set_ylim(-limit, limit)
-    below.set_xticks(x, [WRAPPED_NAMES.get(name, name) for name in names], fontsize="small")
-    below.xaxis.set_minor_locator(NullLocator())
-    below.set_xlim(-0.6, len(names) - 0.4)
-    if count > MAX_UPRIGHT:
-        below.tick_params(axis="x", labelrotation=90)
-    below.set_xlabel(f"{BAND_NAMES[comparison.bands]}, Hz")
     above.set_ylabel(level_label(FORCE_NAMES[fitted.impact.assessed_force(comparison.force)]))
-    below.set_ylabel("(Fit − target)\n/ uncertainty")
-    legend_above(above)
+    lowest = [above, *below][-1]
+    lowest.set_xticks(x, [WRAPPED_NAMES.get(name, name) for name in names], fontsize="small")
+    lowest.xaxis.set_minor_locator(NullLocator())
+    lowest.set_xlim(-0.6, len(names) - 0.4)
+    if count > MAX_UPRIGHT:
+        lowest.tick_params(axis="x", labelrotation=90)
+    lowest.set_xlabel(f"{BAND_NAMES[comparison.bands]}, Hz")
+    limit = 1.2 * max(1.2, np.abs(residuals).max())
+    for axes in below:
+        axes.axhspan(-1, 1, color=GRAY, linewidth=0)
+        axes.plot(x, residuals, **curve_style(1, 4) | {"linestyle": "none"})
+        axes.set_ylim(-limit, limit)
+        axes.set_ylabel("(Fit − target)\n/ uncertainty")
+
+
+def draw_compression_fit(fit: CompressionFit, ax: Axes | None = None) -> Figure:
+    """Draw the measured curve from first touch on, and that of the model."""
+    deflection = fit.deflection - fit.values["touch"]
+    shown = deflection >= 0
+    measured = replace(fit.curve, deflection=deflection[shown], force=fit.force[shown])
+    return compression({"measured": measured, "model": fit.curve}, ax)
 
 
 # Maximum number of parameters with confidence regions.

@@ -23,11 +23,13 @@ from thud.plot.style import (
     band_axis,
     curve_style,
     escape_label,
+    figure_of,
     finish,
     frequency_axis,
     legend_above,
     new_figure,
     own_or,
+    own_panels,
     own_style,
     panel_grid,
 )
@@ -43,7 +45,7 @@ if TYPE_CHECKING:
     from thud.floors.impedance import BallImpedance
     from thud.floors.mobility import Mobility
     from thud.floors.mobility_fit import MobilityFit
-    from thud.impact.floor_impact import FloorImpact
+    from thud.impact.floor_impact import FloorEnergy, FloorImpact
 
 
 THIRDS = BANDWIDTHS[1]
@@ -122,34 +124,12 @@ def _members(layer: Layer) -> list[tuple[float, float]]:
 
 
 @own_style()
-def draw_floor(impact: FloorImpact) -> Figure:
-    """Draw force and floor velocity, the change of the levels, the energy, and the mobility."""
-    figure = new_figure(6.4)
-    history, motion, change, energy, mobilities = figure.subplots(5, 1)
-    _draw_histories(history, motion, impact)
-    change.bar(
-        np.arange(len(get_bands(THIRDS).nominal)), impact.difference(THIRDS), color=COLORS[0],
-        width=0.7,
-    )  # fmt: skip
-    change.axhline(0, color="black", linewidth=0.6)
-    change.set_ylabel("Contact −\nblocked, dB")
-    injected = impact.injected_energy(THIRDS)
-    energy.set_yscale("log")
-    energy.plot(1e3 * injected.energy, **curve_style(0))
-    energy.set_ylabel("Energy into\nthe floor, mJ")
-    energy.sharex(change)
-    change.tick_params(labelbottom=False)
-    band_axis(energy, THIRDS)
-    bands = get_bands(THIRDS)
-    low, high = bands.lower[0], bands.upper[-1]
-    frequency = np.geomspace(low, high, int(_DENSITY * np.log2(high / low)))
-    _add_mobility(mobilities, mobility(impact.floor, frequency))
-    figure.align_ylabels()
-    legend_above(history, motion, mobilities, title="Forces are low-passed at 1.25 kHz")
-    return figure
+def draw_floor(impact: FloorImpact, ax: Axes | None = None) -> Figure:
+    """Draw force and floor velocity, the change of the levels, the energy, and the mobility.
 
-
-def _draw_histories(history: Axes, motion: Axes, impact: FloorImpact) -> None:
+    The axes of a user show the forces.
+    """
+    history, *others = own_panels(ax, 6.4, 5)
     time = 1e3 * (impact.time - impact.touch_time)
     shown = (time >= 0) & (time <= 1e3 * _SHOWN * impact.contact_time)
     forces = {"blocked force": impact.blocked_force, "contact force": impact.floor_force}
@@ -159,12 +139,46 @@ def _draw_histories(history: Axes, motion: Axes, impact: FloorImpact) -> None:
     }
     add_curves(history, recorded)
     history.set_ylabel("Force on the\nfloor, kN")
+    history.margins(x=0)
+    title = "Forces are low-passed at 1.25 kHz"
+    if not others:
+        history.set_xlabel(TIME_LABEL)
+        return finish(history, ax, title)
+    motion, change, energy, mobilities = others
     motion.plot(time[shown], 1e3 * impact.floor_velocity[shown], color=COLORS[2], linewidth=1)
     motion.set_ylabel("Velocity of\nthe floor, mm/s")
     motion.set_xlabel(TIME_LABEL)
     motion.sharex(history)
     history.tick_params(labelbottom=False)
-    history.margins(x=0)
+    change.bar(
+        np.arange(len(get_bands(THIRDS).nominal)), impact.difference(THIRDS), color=COLORS[0],
+        width=0.7,
+    )  # fmt: skip
+    change.axhline(0, color="black", linewidth=0.6)
+    change.set_ylabel("Contact −\nblocked, dB")
+    draw_energy(impact.injected_energy(THIRDS), energy)
+    energy.sharex(change)
+    change.tick_params(labelbottom=False)
+    bands = get_bands(THIRDS)
+    low, high = bands.lower[0], bands.upper[-1]
+    frequency = np.geomspace(low, high, int(_DENSITY * np.log2(high / low)))
+    _add_mobility(mobilities, mobility(impact.floor, frequency))
+    figure = figure_of(history)
+    figure.align_ylabels()
+    legend_above(history, motion, mobilities, title=title)
+    return figure
+
+
+@own_style()
+def draw_energy(injected: FloorEnergy, ax: Axes | None = None) -> Figure:
+    """Draw the energy that a force transfers to a floor against its bands."""
+    axes = own_or(ax, 2.0)
+    axes.set_yscale("log")
+    axes.plot(1e3 * injected.energy, **curve_style(0))
+    axes.set_ylabel("Energy into\nthe floor, mJ")
+    is_third = len(injected.frequency) == len(get_bands(THIRDS).nominal)
+    band_axis(axes, THIRDS if is_third else "octave")
+    return finish(axes, ax)
 
 
 @own_style()
@@ -227,10 +241,9 @@ def plate_modes(floor: FloorOptions, count: int = 6, columns: int = 3) -> Figure
 
 
 @own_style()
-def draw_mobility_fit(fit: MobilityFit) -> Figure:
+def draw_mobility_fit(fit: MobilityFit, ax: Axes | None = None) -> Figure:
     """Draw magnitude and phase of measurement and fit against frequency."""
-    figure = new_figure(3.6)
-    upper, lower = figure.subplots(2, sharex=True)
+    upper, *lower = panels = own_panels(ax, 3.6, 2, sharex=True)
     measured = fit.measured
     fitted = mobility(fit.floor, np.geomspace(measured.frequency[0], measured.frequency[-1], 2000))
     label = f"fitted: relative error {100 * fit.error:.2g} %"
@@ -240,13 +253,13 @@ def draw_mobility_fit(fit: MobilityFit) -> Figure:
         (fitted, {"color": COLORS[0], "label": label}),
     ):  # fmt: skip
         upper.loglog(drawn.frequency, abs(drawn.values), **style)
-        lower.plot(drawn.frequency, np.degrees(np.angle(drawn.values)), **style)
+        for axes in lower:
+            axes.plot(drawn.frequency, np.degrees(np.angle(drawn.values)), **style)
+            axes.set_ylabel("Phase, degrees")
+            axes.set_yticks([-90, 0, 90])
     upper.set_ylabel("Mobility, m/(N s)")
-    lower.set_ylabel("Phase, degrees")
-    lower.set_yticks([-90, 0, 90])
-    frequency_axis(lower)
-    legend_above(upper)
-    return figure
+    frequency_axis(panels[-1])
+    return finish(upper, ax)
 
 
 # Frequencies of the impedances of the floors, Hz.

@@ -19,6 +19,7 @@ from thud.plot.style import (
     level_label,
     new_figure,
     own_or,
+    own_panels,
     own_style,
     tolerance_boxes,
 )
@@ -144,12 +145,11 @@ def draw_blocked_force(force: BlockedForce, ax: Axes | None = None) -> Figure:
 
 
 @own_style()
-def overview(impact: Impact) -> Figure:
+def overview(impact: Impact, ax: Axes | None = None) -> Figure:
     """Draw the assessed force and its octave levels."""
     name = impact.case.model.name.replace("_", " ") if impact.case.model else ""
-    figure = new_figure(5)
-    history, octaves = figure.subplots(2, 1)
+    history, *octaves = panels = own_panels(ax, 5, 2)
     draw_forces(history, {name: impact}, None)
-    draw_levels({"octave": octaves}, {name: impact}, None, impact.limits_source)
-    legend_above(octaves)
-    return figure
+    for axes in octaves:
+        draw_levels({"octave": axes}, {name: impact}, None, impact.limits_source)
+    return finish(panels[-1], ax)

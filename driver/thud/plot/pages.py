@@ -11,7 +11,7 @@ import numpy as np
 from thud.floors.description import rating_title
 from thud.impact.contact_time import contact_force
 from thud.level.assessment import octave_limits
-from thud.level.levels import get_bands
+from thud.level.levels import BANDWIDTHS, get_bands
 from thud.plot.impact_figures import (
     draw_forces,
     draw_levels,
@@ -25,9 +25,11 @@ from thud.plot.style import (
     assessed_curves,
     band_axis,
     escape_label,
+    figure_of,
+    finish,
     legend_above,
     level_label,
-    new_figure,
+    own_panels,
     own_style,
 )
 from thud.plot.templates import render
@@ -39,10 +41,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from thud.base._schema import BandSet, LevelsForce, LimitsSource
+    from thud.base._schema import BandSet
+    from thud.comparison.comparison import Comparison
     from thud.floors.floor_comparison import FloorComparison
     from thud.floors.prediction import RoomPrediction
-    from thud.recordings.recording import ImpactResult
 
     Array = NDArray[np.float64]
 
@@ -105,37 +107,25 @@ def _bands_plot(
 
 
 @own_style()
-def comparison_figure(
-    impacts: Mapping[str, ImpactResult], force: LevelsForce | None, source: LimitsSource
-) -> Figure:
-    """Draw forces, octave and one-third-octave levels of impacts.
-
-    The tolerance band is that of the source; arguments are those of `thud.compare`.
-    """
-    figure = new_figure(6.3)
-    history, octaves, third_octaves = figure.subplots(3, 1, height_ratios=[1.4, 1, 1])
+def draw_comparison(comparison: Comparison, ax: Axes | None = None) -> Figure:
+    """Draw forces, octave and one-third-octave levels of impacts; in axes of a user the forces."""
+    impacts, force = comparison.impacts, comparison.force
+    history, *others = own_panels(ax, 6.3, 3, height_ratios=[1.4, 1, 1])
     draw_forces(history, impacts, force)
-    panels: dict[BandSet, Axes] = {"octave": octaves, "third": third_octaves}
-    draw_levels(panels, impacts, force, source)
+    if not others:
+        return finish(history, ax)
+    draw_levels(dict(zip(BANDWIDTHS, others, strict=True)), impacts, force, comparison.source)
     _, name = assessed_curves(impacts, force)
-    for axes in panels.values():
+    for axes in others:
         axes.set_ylabel(level_label(name, LEVEL.replace(", ", ",\n", 1)))
-    figure.align_ylabels()
-    legend_above(octaves)
-    return figure
+    figure_of(history).align_ylabels()
+    return finish(others[0], ax)
 
 
-def comparison_html(
-    impacts: Mapping[str, ImpactResult],
-    force: LevelsForce | None,
-    source: LimitsSource,
-    table: Sequence[Sequence[str]],
-) -> str:
-    """Return a page of interactive plots and the table, readable on any screen.
-
-    The table is rows of text, header row first.
-    """
-    curves, name = assessed_curves(impacts, force)
+def comparison_html(comparison: Comparison) -> str:
+    """Return a page of interactive plots and the table, readable on any screen."""
+    source = comparison.source
+    curves, name = assessed_curves(comparison.impacts, comparison.force)
     level_title = "Force exposure level" + f" ({name})" * (name != "force")
     forces = _plot(
         {"title": "Time since first touch", "unit": "ms"},
@@ -143,9 +133,8 @@ def comparison_html(
         {label: contact_force(*curve) for label, curve in curves.items()},
     )
     y = {"title": level_title, "unit": "dB", "reference": " re 1 N, 1 s"}
-    bands: tuple[BandSet, ...] = ("octave", "third")
     levels = []
-    for kind in bands:
+    for kind in BANDWIDTHS:
         curve = {name: impact.levels(kind, force=force) for name, (impact, force) in curves.items()}
         levels.append(_bands_plot(get_bands(kind).nominal, kind, y, curve))
     levels[0]["limits"] = np.transpose(octave_limits(source)).tolist()
@@ -154,7 +143,7 @@ def comparison_html(
         "Forces as force plates record them, low-passed at 1.25 kHz, and their levels; gray boxes "
         f"are the tolerances of the standards for the {source.replace('_', ' ')}, which "
         "one-third-octave bands do not have.",
-        table,
+        comparison.rows(),
         [forces, *levels],
     )
 
@@ -173,19 +162,23 @@ _SAME = 0.05
 
 
 @own_style()
-def draw_floors(comparison: FloorComparison) -> Figure:
-    """Draw ratings with uncertainties, levels in the room, and the steps that lead to them."""
+def draw_floors(comparison: FloorComparison, ax: Axes | None = None) -> Figure:
+    """Draw levels in the room, ratings with uncertainties above, and below what leads to them.
+
+    The axes of a user show the levels.
+    """
     predictions = comparison.predictions.values()
     rows = 0.3 + 0.35 * len(predictions)
-    figure = new_figure(5.2 + rows)
-    ratings, *panels = figure.subplots(5, 1, height_ratios=[rows, 1.4, *[1] * 3])
-    steps = zip(*map(_step_values, predictions), strict=True)
+    panels = own_panels(ax, 5.2 + rows, 5, height_ratios=[rows, 1.4, *[1] * 3])
+    shown = panels[-4:]
+    # From top to bottom: from the level back to the force.
+    steps = [*zip(_STEPS, zip(*map(_step_values, predictions), strict=True), strict=True)][::-1]
     nominal = next(iter(predictions)).frequency
-    for axes, (title, unit, reference), curves in zip(panels[::-1], _STEPS, steps, strict=True):
+    for axes, ((title, unit, reference), curves) in zip(shown, steps, strict=ax is None):
         band_axis(axes, "third", nominal)
         blank = " " if "\n" in title else "\n"
         axes.set_ylabel(f"{title},{blank}{unit}{reference}")
-        if axes is panels[-1] and len(curves) > 1 and np.ptp(curves, axis=0).max() < _SAME:
+        if title == _STEPS[0][0] and len(curves) > 1 and np.ptp(curves, axis=0).max() < _SAME:
             axes.plot(curves[0], color="black", marker=".", linewidth=1)
             axes.text(
                 0.97, 0.9, "equal for all floors", transform=axes.transAxes, ha="right", va="top"
@@ -193,12 +186,15 @@ def draw_floors(comparison: FloorComparison) -> Figure:
             continue
         levels = dict(zip(comparison.predictions, curves, strict=True))
         add_levels(axes, levels, "third", nominal, 3.5)
-    for axes in panels[:-1]:
+    if ax is not None:
+        return finish(ax, ax)
+    for axes in shown[:-1]:
         axes.tick_params(axis="x", labelbottom=False)
         axes.set_xlabel("")
-    _draw_ratings(ratings, comparison)
-    figure.align_ylabels(panels)
-    legend_above(panels[0], ratings)
+    _draw_ratings(panels[0], comparison)
+    figure = figure_of(panels[0])
+    figure.align_ylabels(shown)
+    legend_above(shown[0], panels[0])
     return figure
 
 

@@ -14,8 +14,8 @@ from thud.plot.style import (
     ERROR_BARS,
     GRAY,
     band_axis,
-    empty_axes,
-    legend_above,
+    finish,
+    own_or,
     own_style,
     tolerance_boxes,
 )
@@ -46,12 +46,12 @@ DEVIANT: dict[str, Any] = {"color": COLORS[1], "linewidth": 0.7, "linestyle": (0
 
 
 @own_style()
-def recording_forces(recording: Recording) -> Figure:
+def recording_forces(recording: Recording, ax: Axes | None = None) -> Figure:
     """Draw the force of every drop, low-passed at 1.25 kHz, and their average, against time.
 
     The contact time is drawn with its limits and its expanded uncertainty (95 %).
     """
-    figure, axes = empty_axes(HEIGHT)
+    axes = own_or(ax, HEIGHT)
     limits = next(d for d in recording.assess().criteria if d.name == "contact_time")
     longest = max(drop.contact_time.value for drop in recording.drops)
     longest = max(longest, recording.contact_time, limits.upper if limits.upper < 1 else 0)
@@ -71,8 +71,7 @@ def recording_forces(recording: Recording) -> Figure:
     axes.set_xlim(1e3 * time[0], 1e3 * time[-1])
     axes.set_xlabel(TIME_LABEL)
     axes.set_ylabel("Force on the floor,\nbelow 1.25 kHz, kN")
-    legend_above(axes)
-    return figure
+    return finish(axes, ax)
 
 
 def _recorded(drop: Drop, time: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -84,7 +83,9 @@ def _recorded(drop: Drop, time: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @own_style()
-def recording_levels(recording: Recording, bands: BandSet = "octave") -> Figure:
+def recording_levels(
+    recording: Recording, ax: Axes | None = None, bands: BandSet = "octave"
+) -> Figure:
     """Draw the levels of every drop, their average with its expanded uncertainty, the background.
 
     Levels of octaves are drawn with the tolerances of the verdict.
@@ -93,11 +94,13 @@ def recording_levels(recording: Recording, bands: BandSet = "octave") -> Figure:
     ----------
     recording
         The recording.
+    ax
+        Axes in which it is drawn; by default those of a new figure.
     bands
         ``"octave"`` or ``"third"``.
     """
     average = recording.average(bands)
-    figure, axes = empty_axes(HEIGHT)
+    axes = own_or(ax, HEIGHT)
     if bands == BANDWIDTHS[0]:
         verdict = recording.assess()
         octaves = verdict.criteria[: len(average.level)]
@@ -119,8 +122,7 @@ def recording_levels(recording: Recording, bands: BandSet = "octave") -> Figure:
     draw_background(axes, average.background, average.level)
     band_axis(axes, bands)
     axes.set_ylabel("Force exposure level\n(force on the floor), dB")
-    legend_above(axes)
-    return figure
+    return finish(axes, ax)
 
 
 def draw_background(

@@ -43,7 +43,8 @@ def draw_stage(stage: Stage) -> Figure:
     """Draw what a stage of the measurement returns, or a drop after each of them."""
     panels = _panels(stage)
     columns = min(2, len(panels))
-    figure, axes = panel_grid(len(panels), columns, HEIGHT - 0.3, width=columns * WIDTH)
+    figure, axes = panel_grid(len(panels), columns, HEIGHT - 0.3)
+    figure.set_figwidth(columns * WIDTH)
     for panel, (draw, part) in zip(axes, panels, strict=True):
         draw(panel, part)
         if len(panel.get_legend_handles_labels()[0]) > 1:

@@ -20,8 +20,9 @@ from thud.plot.style import (
     RATING_SYMBOL,
     band_axis,
     curve_style,
-    empty_axes,
-    legend_above,
+    figure_of,
+    finish,
+    own_or,
     own_style,
     panel_grid,
     tolerance_boxes,
@@ -50,14 +51,14 @@ _NEAR = 1.0
 
 
 @own_style()
-def draw_design(result: Design) -> Figure:
+def draw_design(result: Design, ax: Axes | None = None) -> Figure:
     """Draw the margin of a design map, dB, its zero as a line, and the samples that conform.
 
     The margin is positive if all octave levels lie within their limits. For a case with a room the
     figure shows the rating of the room instead, with the required one and, if it is
     that of octaves, the limits of the classes of KS F 2863-2. One parameter is drawn as a curve.
     """
-    figure, axes = empty_axes(2.4 if len(result.axes) == 1 else 2.9)
+    axes = own_or(ax, 2.4 if len(result.axes) == 1 else 2.9)
     rating = result.room_rating
     values = result.dataset["margin"] if rating is None else rating
     label = f"Margin ({FORCE_NAMES[result.dataset.attrs['assessed_force']]}), dB"
@@ -74,9 +75,9 @@ def draw_design(result: Design) -> Figure:
             if rating is None or low < limit < high:
                 axes.axhline(limit, color=COLORS[1], linestyle=LINES[i], label=title)
     else:
-        _draw_map(figure, axes, result, np.ma.masked_invalid(values.transpose(*result.axes)), label)
-    legend_above(axes, title="Limits of the octaves" if rating is None else "Limits of the rating")
-    return figure
+        _draw_map(axes, result, np.ma.masked_invalid(values.transpose(*result.axes)), label)
+    title = "Limits of the octaves" if rating is None else "Limits of the rating"
+    return finish(axes, ax, title)
 
 
 def _limits(result: Design) -> list[tuple[str, float]]:
@@ -100,9 +101,7 @@ def _limits(result: Design) -> list[tuple[str, float]]:
     return [(name, excess_level(limit)) for name, limit in limits]
 
 
-def _draw_map(
-    figure: Figure, axes: Axes, result: Design, values: np.ma.MaskedArray[Any, Any], label: str
-) -> None:
+def _draw_map(axes: Axes, result: Design, values: np.ma.MaskedArray[Any, Any], label: str) -> None:
     """Draw values, shape (n_x, n_y), as colors with lines at round ones, and the limits."""
     is_margin = result.room_rating is None
     factors = [
@@ -111,7 +110,7 @@ def _draw_map(
     ]
     x, y = (result.dataset[n].values * f for n, f in zip(result.axes, factors, strict=True))
     if values.count():
-        _draw_colors(figure, axes, (x, y), values.T, is_margin=is_margin).set_label(label)
+        _draw_colors(axes, (x, y), values.T, is_margin=is_margin).set_label(label)
         _draw_limits(axes, (x, y), values.T, _limits(result), COLORS[6 if is_margin else 1])
     if is_margin:
         _mark_samples(axes, (x, y), result)
@@ -125,7 +124,6 @@ def _draw_map(
 
 
 def _draw_colors(
-    figure: Figure,
     axes: Axes,
     position: tuple[NDArray[np.float64], NDArray[np.float64]],
     values: np.ma.MaskedArray[Any, Any],
@@ -145,7 +143,7 @@ def _draw_colors(
     # Five colors from one line to the next.
     fine = np.linspace(steps[0], steps[-1], 5 * (len(steps) - 1) + 1)
     filled = axes.contourf(*position, values, levels=fine, **style)
-    bar = figure.colorbar(filled, ax=axes, ticks=steps)
+    bar = figure_of(axes).colorbar(filled, ax=axes, ticks=steps)
     inside = steps[(steps > values.min()) & (steps < values.max())]
     inside = inside[inside != 0] if is_margin else inside
     if inside.size:
@@ -196,20 +194,20 @@ def _mark_samples(
 
 
 @own_style()
-def draw_sensitivity(result: Sensitivity) -> Figure:
+def draw_sensitivity(result: Sensitivity, ax: Axes | None = None) -> Figure:
     """Draw total Sobol indices of each output as bars, first orders as marks, with intervals.
 
-    Each parameter has a panel.
+    Each parameter has a panel; axes of a user show the first.
     """
     indices = result.indices
     parameters = [str(name) for name in indices["parameter"].values]
     outputs = [str(name) for name in indices["output"].values]
     columns = min(len(parameters), _MAX_COLUMNS)
     height = 0.3 + 0.18 * len(outputs)
-    figure, panels = panel_grid(len(parameters), columns, height, shared=True)
+    figure, panels = panel_grid(len(parameters), columns, height, shared=True, ax=ax)
     y = np.arange(len(outputs), dtype=float)
     bar: dict[str, Any] = {"color": "black", "linestyle": "none", "elinewidth": 0.7}
-    for axes, name in zip(panels, parameters, strict=True):
+    for axes, name in zip(panels, parameters, strict=ax is None):
         row = indices.sel(parameter=name)
         axes.barh(y, row["total"], 0.8, color=COLORS[5], label="total index")
         axes.errorbar(
@@ -228,13 +226,12 @@ def draw_sensitivity(result: Sensitivity) -> Figure:
     first.set_xlim(min(0.0, low), max(1.0, high))
     first.set_xticks([0, 0.5, 1], ["0", "0.5", "1"])
     force = FORCE_NAMES[result.dataset.attrs["assessed_force"]]
-    figure.supxlabel(f"Sobol index ({force})")
-    legend_above(first)
-    return figure
+    (ax.set_xlabel if ax is not None else figure.supxlabel)(f"Sobol index ({force})")
+    return finish(first, ax)
 
 
 @own_style()
-def draw_surrogate(result: Surrogate) -> Figure:
+def draw_surrogate(result: Surrogate, ax: Axes | None = None) -> Figure:
     """Draw the error of each assessed quantity in held-out drops, dB.
 
     The error of a quantity that is not a level is 20 lg of the ratio to the result of the model.
@@ -243,7 +240,7 @@ def draw_surrogate(result: Surrogate) -> Figure:
         name for name, assessed in zip(result.labels, result.assessed, strict=True) if assessed
     ]
     residuals = result.residuals[:, result.assessed]
-    figure, axes = empty_axes(0.9 + 0.2 * len(labels))
+    axes = own_or(ax, 0.9 + 0.2 * len(labels))
     position = np.arange(len(labels), dtype=float)
     for i, values in enumerate(residuals.T):
         axes.plot(
@@ -258,19 +255,18 @@ def draw_surrogate(result: Surrogate) -> Figure:
     axes.set_yticks(position, [name[0].upper() + name[1:] for name in names])
     axes.set_ylim(len(labels) - 0.5, -0.5)
     axes.set_xlabel("Surrogate − model, dB")
-    legend_above(axes)
-    return figure
+    return finish(axes, ax)
 
 
 @own_style()
-def draw_uncertainty(result: Uncertainty) -> Figure:
+def draw_uncertainty(result: Uncertainty, ax: Axes | None = None) -> Figure:
     """Draw the distribution of octave levels, and the tolerances of the standards.
 
     Levels are relative to the nominal ones, dB; bars cover 95 % of the samples.
     """
     lower, upper = octave_limits(result.source)
     nominal = (lower + upper) / 2
-    figure, axes = empty_axes(2.8)
+    axes = own_or(ax, 2.8)
     label = f"Tolerance, {result.source.replace('_', ' ')}"
     tolerance_boxes(axes, lower - nominal, upper - nominal, label)
     levels = result.levels - nominal
@@ -294,5 +290,4 @@ def draw_uncertainty(result: Uncertainty) -> Figure:
     if result.surrogate_range:
         low, high = result.surrogate_range
         title += f"\nwith errors of the surrogate {100 * low:.1f} to {100 * high:.1f} %"
-    legend_above(axes, title=title)
-    return figure
+    return finish(axes, ax, title)

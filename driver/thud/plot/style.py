@@ -13,8 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
-from thud.base.checks import require_kind, require_mapping
-from thud.base.errors import InputError
+from thud.base.checks import refuse, require_kind, require_mapping
 from thud.level.assessment import ImpactOrRecording
 from thud.level.levels import get_bands
 
@@ -101,26 +100,52 @@ def own_or(ax: Axes | None, height: float) -> Axes:
     return empty_axes(height)[1] if ax is None else ax
 
 
+def own_panels(
+    ax: Axes | None,
+    height: float,
+    count: int,
+    **options: Any,  # noqa: ANN401 - of matplotlib
+) -> list[Axes]:
+    """Return the axes of a user alone, or the panels of a new figure, one below the other."""
+    if ax is not None:
+        return [ax]
+    return [*new_figure(height).subplots(count, squeeze=False, **options).flat]
+
+
+def figure_of(axes: Axes) -> Figure:
+    """Return the figure of axes; raise InputError if they are removed from it."""
+    figure = axes.get_figure(root=True)
+    if figure is None:
+        refuse("the axes are removed from their figure", "axes of a figure")
+    return figure
+
+
 def finish(axes: Axes, ax: Axes | None, title: str = "") -> Figure:
     """Add the legend, above an own figure or inside the axes of a user; return the figure."""
     if ax is None:
         legend_above(axes, title=title)
-    elif axes.get_legend_handles_labels()[1]:
-        axes.legend(title=title or None)
-    figure = axes.get_figure(root=True)
-    assert figure is not None  # noqa: S101 - for the type checker
-    return figure
+    elif len(axes.get_legend_handles_labels()[1]) > (not title):
+        axes.legend(title=title or None, fontsize="small", title_fontsize="small")
+    return figure_of(axes)
 
 
 def panel_grid(
-    count: int, columns: int, height: float, *, width: float = WIDTH, shared: bool = False
+    count: int,
+    columns: int,
+    height: float,
+    *,
+    shared: bool = False,
+    ax: Axes | None = None,
 ) -> tuple[Figure, list[Axes]]:
-    """Return a figure and its panels, row by row; width and height of a row in inches.
+    """Return a figure of column width and its panels, row by row; height of a row in inches.
 
-    Panels with shared axes have labels of the x axis in the lowest row only.
+    Panels with shared axes have labels of the x axis in the lowest row only. The axes of a user are
+    the only panel.
     """
+    if ax is not None:
+        return figure_of(ax), [ax]
     # Half an inch for labels and colors below the panels.
-    figure = new_figure(0.5 + height * -(-count // columns), width)
+    figure = new_figure(0.5 + height * -(-count // columns))
     grid = figure.subplots(
         -(-count // columns), columns, sharex=shared, sharey=shared, squeeze=False
     ).ravel()
@@ -147,10 +172,7 @@ def legend_above(axes: Axes, *others: Axes, title: str = "") -> None:
 
     Text without formulas is small. A single curve needs no legend without a title.
     """
-    figure = axes.get_figure(root=True)
-    if figure is None:
-        message = "the axes are removed from their figure; allowed: axes of a figure"
-        raise InputError(message)
+    figure = figure_of(axes)
     entries = [
         (handle, fill(name, _LINE))
         for panel in (axes, *others)

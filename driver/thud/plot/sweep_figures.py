@@ -17,7 +17,7 @@ from thud.plot.style import (
     FORCE_NAMES,
     RATING_SYMBOL,
     curve_style,
-    legend_above,
+    finish,
     own_style,
     panel_grid,
 )
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
+    from thud.impact.ensemble import Ensemble
     from thud.studies.sweep import Sweep
 
     Columns = dict[str, NDArray[Any]]
@@ -53,10 +54,12 @@ def show_parameter(axes: Axes, which: Literal["x", "y"], parameter: xr.DataArray
 
     Return the factor that converts its values to the unit of the axis.
     """
-    unit, factor = parameter.attrs["shown_unit"], 10.0 ** int(parameter.attrs["shown_exponent"])
+    own = parameter.attrs["units"]
+    unit = parameter.attrs.get("shown_unit", own)
+    factor = 10.0 ** int(parameter.attrs.get("shown_exponent", 0))
     values = parameter.values
     maximum = float(np.abs(values).max())
-    if unit == parameter.attrs["units"] and not _PLAIN_RANGE[0] <= maximum < _PLAIN_RANGE[1]:
+    if unit == own and not _PLAIN_RANGE[0] <= maximum < _PLAIN_RANGE[1]:
         unit, size = display_unit(unit, maximum)
         factor = 1 / size
     # A digit behind a unit is an exponent, as in "MN/m3".
@@ -105,15 +108,15 @@ class _Curves(NamedTuple):
 
 
 @own_style()
-def draw_sweep(result: Sweep) -> Figure:
+def draw_sweep(result: Sweep | Ensemble, ax: Axes | None = None) -> Figure:
     """Draw octave levels against the first numeric parameter that has several values.
 
     Levels are those of the assessed force relative to the nominal ones, dB; for a case with a room
     the rating of the levels in it is drawn instead. The first text
-    parameter with up to six values has a panel for each. Lines are medians over the other
-    parameters; shades extend from the minimum to the maximum.
+    parameter with up to six values has a panel for each; axes of a user show the first. Lines are
+    medians over the other parameters; shades extend from the minimum to the maximum.
     """
-    dataset = result.dataset
+    dataset = result.to_xarray()
     columns = _columns(dataset)
     varied = [name for name, values in columns.items() if len(np.unique(values)) > 1]
     numeric = [name for name in varied if columns[name].dtype.kind in "iuf"]
@@ -132,9 +135,9 @@ def draw_sweep(result: Sweep) -> Figure:
         masks = {str(value): values == value for value in np.unique(values)}
     column_count = 1 if len(masks) == 1 else 2
     height = 2.5 if column_count == 1 else 1.8
-    figure, panels = panel_grid(len(masks), column_count, height, shared=True)
+    figure, panels = panel_grid(len(masks), column_count, height, shared=True, ax=ax)
     has_shades = False
-    for axes, (title, mask) in zip(panels, masks.items(), strict=True):
+    for axes, (title, mask) in zip(panels, masks.items(), strict=ax is None):
         # The maximum tolerance of all octaves around the nominal level, the minimum on top.
         for width, color in zip(drawn.tolerance[::-1], ("0.92", "0.84"), strict=False):
             axes.axhspan(-width, width, color=color, linewidth=0, zorder=0)
@@ -144,11 +147,10 @@ def draw_sweep(result: Sweep) -> Figure:
         max_markers = _MAX_MARKERS // column_count
         has_shades |= _draw_curves(axes, dataset[name], columns[name], curves, max_markers)
         axes.set_title(title.replace("_", " "))
-    figure.supylabel(drawn.label)
+    (ax.set_ylabel if ax is not None else figure.supylabel)(drawn.label)
     others = [n for n in varied if n not in {name, panel_parameter}]
     explanation = _get_explanation(drawn, panel_parameter, others, has_shades=has_shades)
-    legend_above(panels[0], title=explanation)
-    return figure
+    return finish(panels[0], ax, explanation)
 
 
 def _columns(dataset: xr.Dataset) -> Columns:

@@ -6,7 +6,7 @@ import math
 from typing import TYPE_CHECKING
 
 from thud.base._schema import VERDICTS
-from thud.plot.style import COLORS, ERROR_BARS, GRAY, empty_axes, own_style
+from thud.plot.style import COLORS, ERROR_BARS, GRAY, finish, own_or, own_style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,13 +21,13 @@ _BEYOND = 1.0
 
 
 @own_style()
-def draw_verdict(verdict: Verdict, ax: Axes | None = None) -> Figure | Axes:
+def draw_verdict(verdict: Verdict, ax: Axes | None = None) -> Figure:
     """Draw values with their uncertainties, or ranges over what is not known, between the limits.
 
     Values are drawn as fractions of the range of each criterion, and those beyond the axis at its
     edge; unknown values and criteria without a range are omitted.
     """
-    figure, axes = (None, ax) if ax else empty_axes(3.2)
+    axes = own_or(ax, 3.2)
     shown = [c for c in verdict.criteria if c.upper > c.lower and math.isfinite(c.value)]
     axes.axvspan(0, 1, color=GRAY, linewidth=0)
     for row, criterion in enumerate(shown):
@@ -43,4 +43,4 @@ def draw_verdict(verdict: Verdict, ax: Axes | None = None) -> Figure | Axes:
     axes.set_ylim(len(shown) - 0.5, -0.5)
     axes.set_xlim(-_BEYOND - 0.1, 1.1 + _BEYOND)
     axes.set_xticks([0, 1], ["lower\nlimit", "upper\nlimit"])
-    return figure or axes
+    return finish(axes, ax)

@@ -25,6 +25,7 @@ from thud.recordings.recorded_levels import average_levels, mean_force, measure_
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
@@ -157,11 +158,6 @@ class Recording(ImpactOrRecording):
         of_files = (note for origin in self.origins for note in origin.notes)
         return (*self.own_notes, *of_files, *(note for drop in self.drops for note in drop.notes))
 
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Those of `notes` that are warnings, a sentence each."""
-        return tuple(note.message for note in self.notes if note.is_warning)
-
     @cached_property
     def own_notes(self) -> tuple[Note, ...]:
         """Possible faults of the recording as a whole, and its outliers."""
@@ -272,12 +268,12 @@ class Recording(ImpactOrRecording):
             **{name: self.estimates[name] for name in ASSESSED},
         )
 
-    def plot(self, kind: Literal["levels", "force"] = "levels") -> Figure:
+    def plot(self, ax: Axes | None = None, kind: Literal["levels", "force"] = "levels") -> Figure:
         """Draw the levels of the drops over the tolerance band, or their forces."""
         from thud.plot.recording_figures import recording_forces, recording_levels
 
         require_choice("kind", kind, ("levels", "force"))
-        return recording_levels(self) if kind == "levels" else recording_forces(self)
+        return (recording_levels if kind == "levels" else recording_forces)(self, ax)
 
     def to_xarray(self) -> xr.Dataset:
         """Return the force of the first drop, the average levels and the means over the drops.

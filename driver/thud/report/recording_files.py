@@ -173,7 +173,7 @@ def draw_figures(recording: Recording) -> dict[str, bytes]:
     # Matplotlib is slow to import.
     from thud.plot.save_figures import figure_files
 
-    return figure_files(draw_all({name: partial(recording.plot, name) for name in FIGURES}))
+    return figure_files(draw_all({name: partial(recording.plot, kind=name) for name in FIGURES}))
 
 
 def page_contents(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -27,7 +27,6 @@ from thud.studies.fitting.residual_tests import color_warning, misfit_ratio
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from matplotlib.figure import Figure
     from numpy.typing import ArrayLike
 
     from thud.base._schema import CompressionGas, ModelName, ModelOptions
@@ -77,6 +76,8 @@ class CompressionFit(Estimates):
         What they add to the force of the model, N.
     """
 
+    drawn_by: ClassVar[str] = "fit_figures.draw_compression_fit"
+
     deflection: Array
     force: Array
     curve: CompressionCurve
@@ -105,18 +106,6 @@ class CompressionFit(Estimates):
     def files(self) -> dict[str, bytes]:
         """Return ``fit.json`` and ``fit.csv`` by name."""
         return compression_files(self)
-
-    def plot(self) -> Figure:
-        """Draw the measured curve from first touch on, and that of the model."""
-        from thud.plot import compression
-
-        shown = self.deflection >= self.values["touch"]
-        measured = replace(
-            self.curve,
-            deflection=(self.deflection - self.values["touch"])[shown],
-            force=self.force[shown],
-        )
-        return compression({"measured": measured, "model": self.curve})
 
 
 def fit_compression(  # noqa: PLR0913 - as in `compress`

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     import os
 
     import xarray as xr
-    from matplotlib.figure import Figure
 
     from thud.studies.run import RunOptions
     from thud.studies.study import Source, Study
@@ -38,6 +37,8 @@ class Design(SampleResult):
         is the verdict by all criteria. If the case has a room, the figure shows `room_rating`
         instead.
     """
+
+    drawn_by: ClassVar[str] = "study_figures.draw_design"
 
     kind: ClassVar[str] = "design"
 
@@ -150,12 +151,6 @@ class Design(SampleResult):
             value = float(best[name]) * 10.0 ** attributes["shown_exponent"]
             rows.append((f"  at {name}, {attributes['shown_unit']}", f"{value:.4g}"))
         return rows
-
-    def plot(self) -> Figure:
-        """Return the map as a figure."""
-        from thud.plot import draw_design
-
-        return draw_design(self)
 
 
 def design(

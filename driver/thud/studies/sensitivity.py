@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     import os
 
     import pandas as pd
-    from matplotlib.figure import Figure
 
     from thud.studies.arrays import Array
     from thud.studies.run import RunOptions
@@ -52,6 +51,8 @@ class Sensitivity(SampleResult):
     left_out : int
         Number of base samples left out because one of their samples has no result.
     """
+
+    drawn_by: ClassVar[str] = "study_figures.draw_sensitivity"
 
     kind: ClassVar[str] = "sensitivity"
     table_ending: ClassVar[str] = "_indices.csv"
@@ -87,12 +88,6 @@ class Sensitivity(SampleResult):
     def to_dataframe(self) -> pd.DataFrame:
         """Return all indices, with a row for each output and parameter."""
         return self.indices.to_dataframe(dim_order=["output", "parameter"])
-
-    def plot(self) -> Figure:
-        """Return the indices as bars."""
-        from thud.plot import draw_sensitivity
-
-        return draw_sensitivity(self)
 
 
 def _index_text(index: float, half_width: float) -> str:

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     import os
 
     import xarray as xr
-    from matplotlib.figure import Figure
 
     from thud.studies.run import RunOptions
     from thud.studies.study import Source
@@ -30,6 +29,8 @@ class Sweep(SampleResult):
     dataset : Dataset
         A grid has one dimension per parameter, other designs the dimension ``sample``.
     """
+
+    drawn_by: ClassVar[str] = "sweep_figures.draw_sweep"
 
     kind: ClassVar[str] = "sweep"
 
@@ -56,12 +57,6 @@ class Sweep(SampleResult):
                     rows.append((label, *(quantity.show(float(number)) for number in numbers)))
         rows.append(("conforming samples", "", "", f"{int(self.dataset['conforms'].sum())}"))
         return rows
-
-    def plot(self) -> Figure:
-        """Return levels against the first numeric parameter."""
-        from thud.plot import draw_sweep
-
-        return draw_sweep(self)
 
 
 def sweep(

@@ -30,7 +30,6 @@ if TYPE_CHECKING:
 
     import pandas as pd
     import xarray as xr
-    from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
     from thud.base._schema import LimitsSource
@@ -90,6 +89,7 @@ class Surrogate(SampleResult):
     """
 
     kind: ClassVar[str] = "surrogate"
+    drawn_by: ClassVar[str] = "study_figures.draw_surrogate"
 
     dataset: xr.Dataset
     case: Case = field(init=False)
@@ -187,9 +187,9 @@ class Surrogate(SampleResult):
         )]  # fmt: skip
 
     @property
-    def notes(self) -> tuple[str, ...]:
+    def notes(self) -> tuple[Note, ...]:
         """Accuracy of the surrogate."""
-        return (self.accuracy,)
+        return (Note("surrogate", others={"accuracy": self.accuracy}),)
 
     @property
     def accuracy(self) -> str:
@@ -199,12 +199,6 @@ class Surrogate(SampleResult):
             f"surrogate of {len(self.points)} drops: 95 % of held-out drops within {error:.2g} dB "
             f"({label}; other quantities of the verdict have smaller errors)"
         )
-
-    def plot(self) -> Figure:
-        """Return the errors of the held-out drops."""
-        from thud.plot import draw_surrogate
-
-        return draw_surrogate(self)
 
     @property
     def labels(self) -> list[str]:

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     import os
 
     import xarray as xr
-    from matplotlib.figure import Figure
 
     from thud.base._schema import LimitsSource
     from thud.studies.arrays import Array
@@ -35,6 +34,8 @@ class Uncertainty(SampleResult):
     dataset : Dataset
         Every sample.
     """
+
+    drawn_by: ClassVar[str] = "study_figures.draw_uncertainty"
 
     kind: ClassVar[str] = "uncertainty"
 
@@ -135,12 +136,6 @@ class Uncertainty(SampleResult):
             share = f"{100 * low:.1f} to {100 * high:.1f} %"
             rows.append(("  with errors of the surrogate", "", "", share, ""))
         return rows
-
-    def plot(self) -> Figure:
-        """Return the distribution of the levels."""
-        from thud.plot import draw_uncertainty
-
-        return draw_uncertainty(self)
 
 
 def _spread(values: Array) -> tuple[str, str, str]:

@@ -97,8 +97,8 @@ class Estimates(Displayed):
 
     @property
     def notes(self) -> tuple[Note, ...]:
-        """Notes on what was done, and on the impacts of the model."""
-        return ()
+        """Warnings; of a fit to impacts also what was done to records, and notes on impacts."""
+        return self.warnings
 
     @property
     def display_units(self) -> dict[str, tuple[str, float]]:
@@ -127,10 +127,6 @@ class Estimates(Displayed):
     @abstractmethod
     def table(self) -> str:
         """Return the fit as text."""
-
-    @abstractmethod
-    def plot(self) -> Figure:
-        """Draw measured values and model."""
 
     @abstractmethod
     def files(self) -> dict[str, bytes]:
@@ -171,18 +167,18 @@ class Estimates(Displayed):
     def figure_files(self) -> dict[str, bytes]:
         """Return the contents of the files of the figures by name; a warning if there are none."""
         with warn_if_not_drawn("the figure of the fit"):
-            from thud.plot import figure_files
+            from thud.plot.save_figures import figure_files
 
             return figure_files(self.figures())
         return {}
 
     def save(
-        self, directory: str | os.PathLike[str], *, figures: bool = True, replace: bool = False
-    ) -> list[Path]:
-        """Write the files of `files`, and the figures; return their paths.
+        self, path: str | os.PathLike[str], *, figures: bool = True, replace: bool = False
+    ) -> None:
+        """Write the files of `files`, and the figures, into a directory of their own.
 
         The directory is replaced as a whole; with `replace` also one with results of something
         else. Raises InputError if it holds any other file, OSError if a file cannot be written.
         """
         contents = self.files() | (self.figure_files() if figures else {})
-        return Results(Path(directory), "fit", replace=replace).write(contents)
+        Results(Path(path), "fit", replace=replace).write(contents)

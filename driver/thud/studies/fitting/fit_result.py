@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from thud.base.immutable import Immutable
 from thud.studies.fitting.estimates import Estimates
@@ -82,6 +82,8 @@ class Fit(Estimates):
         Case, impact and comparison of each target.
     """
 
+    drawn_by: ClassVar[str] = "fit_figures.target_and_fit"
+
     known_noise: bool
     singular_values: Array
     evaluations: int
@@ -107,11 +109,11 @@ class Fit(Estimates):
 
     @property
     def notes(self) -> tuple[Note, ...]:
-        """What the background of the records holds, and warnings of the impacts at the result."""
+        """Warnings, what the background of the records holds, and notes on the impacts."""
         backgrounds = (getattr(t.comparison, "background", None) for t in self.targets)
         found = (note for background in backgrounds if background for note in background.notes)
-        impacts = (note for target in self.targets for note in target.impact.warnings)
-        return tuple(dict.fromkeys((*found, *impacts)))
+        impacts = (note for target in self.targets for note in target.impact.notes)
+        return tuple(dict.fromkeys((*self.warnings, *found, *impacts)))
 
     def deviation_of(self, target: FittedTarget) -> float:
         """Return the standard deviation of one residual of a target, see `noise`."""
@@ -132,15 +134,9 @@ class Fit(Estimates):
         """Return the fit as text."""
         return fit_table(self)
 
-    def plot(self) -> Figure:
-        """Draw the first target and the model, and below them their difference."""
-        from thud.plot import target_and_fit
-
-        return target_and_fit(self)
-
     def figures(self) -> dict[str, Figure]:
         """Return the figures of all targets, and confidence regions, by the names of files."""
-        from thud.plot import draw_fit
+        from thud.plot.fit_figures import draw_fit
 
         return draw_fit(self)
 
