@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 import thud
 from thud.base.display import Displayed, Tabulated
 from thud.base.note import Note
-from thud.base.tables import WIDTH, format_rows
+from thud.base.tables import format_rows
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -227,7 +227,7 @@ def test_dataset_of_an_impact_has_units_and_provenance(
     np.testing.assert_array_equal(found["time"], flagship.time)
     third = flagship.levels("third", force="elastic")
     np.testing.assert_array_equal(found["elastic_third"], third)
-    assert found["third"].values.tolist() == thud.get_bands("third").nominal.tolist()
+    assert found["third"].to_numpy().tolist() == thud.get_bands("third").nominal.tolist()
     assert float(found["peak_force"]) == flagship.peak_force
     assert bool(found["conforms"])
     assert all({"units", "long_name"} <= set(entry.attrs) for entry in found.variables.values())
@@ -252,8 +252,8 @@ def test_dataset_of_an_ensemble_is_that_of_a_study() -> None:
         np.testing.assert_array_equal(found[name].values, study[name].values)
         assert found[name].attrs == study[name].attrs
     np.testing.assert_array_equal(found["floor_force"], many.floor_force)
-    assert found["time"].values[-1] == pytest.approx(many.case.sampling.duration, abs=1e-4)
-    assert found["height"].values.tolist() == heights["height"]
+    assert found["time"].to_numpy()[-1] == pytest.approx(many.case.sampling.duration, abs=1e-4)
+    assert found["height"].to_numpy().tolist() == heights["height"]
     assert found.attrs["case"] == study.attrs["case"].replace("'both'", "'third'")
     # Keys that are named as results are.
     lumped = thud.solve_many({"contact_time": [0.02], "restitution": [0.8]}, model="hunt_crossley")

@@ -18,6 +18,7 @@ from thud.base._schema import KEYS, LIMITS, SAMPLE_QUANTITIES
 from thud.base.bridge import version
 from thud.base.checks import refuse, refuse_value, require_kind
 from thud.base.extras import data_frame, require_extra
+from thud.base.note import Note
 from thud.case.case import Case, impact_only
 from thud.case.keys import OUTPUT_GROUP, value_in, with_values
 from thud.impact.datasets import FREQUENCIES, LEVELS, RESULTS
