@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,9 +31,6 @@ if TYPE_CHECKING:
 
     Answer = dict[str, Any]
 
-# Maximum density of a layer that is air, kg/m3.
-MAX_AIR = 2.0
-
 
 def section(case: Case) -> Answer | None:
     """Return what a section shows: source, and layers from top to bottom; lengths in m.
@@ -48,16 +46,7 @@ def section(case: Case) -> Answer | None:
     return {
         "radius": case.ball.outer_radius if is_ball else 0.0,
         "height": case.drop.height,
-        "layers": [
-            {
-                "name": layer.description,
-                "thickness": layer.thickness,
-                "width": layer.width,
-                "spacing": layer.spacing,
-                "is_air": 0 < layer.density < MAX_AIR,
-            }
-            for layer in layers
-        ],
+        "layers": [asdict(layer) | {"name": layer.description} for layer in layers],
     }
 
 

@@ -53,15 +53,9 @@ def answer_recording(paths: Sequence[str], table: Mapping[str, Any]) -> dict[str
     answer["limits"]["assumed"] = "source" not in table
     answer["drops"] = len(recording.drops)
     answer["asks"] = _asks(recording, verdict)
-    # The page shows the name of a single file next to its warnings.
-    signals = [path for path in paths if not _is_laboratory(path)]
-    shown_name = Path(signals[0]).name if len(signals) == 1 else ""
-    texts = {
-        "warnings": [note for note in recording.notes if note.is_warning],
-        "open_warnings": decisive_warnings(recording.notes, verdict.criteria),
-    }
-    for key, notes in texts.items():
-        answer[key] = [str(note) if note.subject == shown_name else note.message for note in notes]
+    answer["warnings"] = [note.message for note in recording.notes if note.is_warning]
+    decisive = decisive_warnings(recording.notes, verdict.criteria)
+    answer["open_warnings"] = [note.message for note in decisive]
     return answer
 
 

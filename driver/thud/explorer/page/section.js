@@ -17,6 +17,8 @@ export function showSection({ section, room }) {
   byId("section").replaceChildren(draw(section, room?.size, names), list);
 }
 
+// A density of 0 is not known, kg/m³.
+const isAir = ({ density }) => density > 0 && density < 2;
 const millimeters = (length) => rounded(1000 * length, "mm");
 
 function draw({ radius, height, layers }, size, names) {
@@ -42,7 +44,7 @@ function draw({ radius, height, layers }, size, names) {
   layers.forEach((layer, i) => {
     const thickness = layer.thickness * scale;
     for (const [x, width] of members(layer, scale)) image.append(svgElement("rect",
-      { class: layer.is_air ? "layer air" : `layer tone${i % 2}`, x, y: at, width, height: thickness }));
+      { class: isAir(layer) ? "layer air" : `layer tone${i % 2}`, x, y: at, width, height: thickness }));
     const y = Math.max(at + thickness / 2, last + NUMBER);
     image.append(
       svgElement("path", { class: "leader", d: `M${WIDTH} ${at + thickness / 2}L${WIDTH + 18} ${y}` }),
