@@ -59,7 +59,7 @@ export function showStatus(delay = 0) {
   byId("panel").setAttribute("aria-busy", String(Boolean(job || timer)));
   const show = () => {
     document.body.classList.toggle("outdated", isOutdated);
-    for (const target of document.querySelectorAll("#report, .figure .menu button")) target.disabled = isOutdated;
+    for (const target of document.querySelectorAll("#report, .figure .tools button")) target.disabled = isOutdated;
   };
   if (isOutdated && delay) dimTimer = setTimeout(show, delay);
   else show();

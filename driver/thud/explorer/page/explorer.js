@@ -5,7 +5,7 @@ import { firstVariant } from "thud/first.js";
 import { listenToBall } from "thud/ball.js";
 import { about, caseValues, invalidField, isCase, state, takeValues } from "thud/form.js";
 import { addFiles, recording } from "thud/recording.js";
-import { addPlotMenus, copyText, fileOf } from "thud/files.js";
+import { addPlotButtons, copyText, fileOf } from "thud/files.js";
 import { RETRY_INTERVAL, current, hideMessage, holdForClicks, kept, reconnect, showError, showMessage } from "thud/answers.js";
 import { commit, restoreStored } from "thud/steps.js";
 import { DOORS, formHandlers, keep, move, openDoor, showAll } from "thud/doors.js";
@@ -14,7 +14,7 @@ async function copyLink() {
   if (hasInvalidField()) return;
   const door = state.door === "floor" ? "floor" : "ball";
   const text = encodeURIComponent(JSON.stringify({ door, values: caseValues(door) }));
-  if (await copyText(`${location.origin}/#case=${text}`, "Copy this link")) flash("link", "Link copied");
+  if (await copyText(`${location.origin}/#case=${text}`, "link.txt")) flash("link", "Link copied");
   showNote("The link holds this case. It works while the server runs, in browsers that have opened the full address shown in the terminal.");
 }
 
@@ -89,7 +89,7 @@ async function download(name, copyButton) {
   try {
     const file = await fileOf(name, values);
     if (!copyButton) saveFile(name, file);
-    else if (await copyText(file, copyButton.textContent)) flash(copyButton, "Copied");
+    else if (await copyText(file, name)) flash(copyButton, "Copied");
     hideMessage();
   } catch (error) { showError(error); }
 }
@@ -120,7 +120,7 @@ function listen() {
   addEventListener("keydown", (event) => {
     if (event.key === "Escape") { for (const menu of document.querySelectorAll(".menu[open]")) { menu.open = false; menu.firstElementChild.focus(); } }
     // A field for text has steps of its own.
-    if (!(event.ctrlKey || event.metaKey) || event.target.matches?.("input[type=text], textarea, [contenteditable]")) return;
+    if (!(event.ctrlKey || event.metaKey) || event.target.matches?.("input[type=text]")) return;
     const isRedo = event.key === "y" || (event.key.toLowerCase() === "z" && event.shiftKey);
     if (event.key.toLowerCase() !== "z" && !isRedo) return;
     event.preventDefault();
@@ -169,7 +169,7 @@ async function main() {
     return;
   }
   byId("tools").hidden = false;
-  addPlotMenus();
+  addPlotButtons();
   listen();
   holdForClicks();
   const link = fragment.get("case");

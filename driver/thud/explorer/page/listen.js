@@ -7,16 +7,10 @@ const NOTE = "Computed, not recorded: no measured room, no furniture, no listene
 // Address and full scale, Pa, of each downloaded sound by the text of its case.
 const sounds = new Map();
 
-/** Show the buttons of the variants with a room; the sounds of removed variants are discarded. */
+/** Show the buttons of the variants with a room. */
 export function showSounds(variants, onError) {
   const rooms = variants.filter((variant) => variant.answer.room && variant.values);
   byId("sound_section").hidden = !rooms.length;
-  const cases = rooms.map(caseOf);
-  for (const [text, { address }] of sounds) {
-    if (cases.includes(text)) continue;
-    URL.revokeObjectURL(address);
-    sounds.delete(text);
-  }
   byId("sounds_text").textContent = NOTE;
   byId("sounds").replaceChildren(...rooms.map((variant) => {
     const result = button("", () => playSound(variant, rooms).catch(onError));
@@ -35,10 +29,8 @@ async function playSound(variant, rooms) {
   } finally {
     byId("sounds_text").textContent = NOTE;
   }
-  const scales = rooms.map((room) => sounds.get(caseOf(room))?.fullScale ?? 0);
+  const scales = rooms.map((room) => sounds.get(caseOf(room)).fullScale);
   const sound = sounds.get(caseOf(variant));
-  // The variant was removed meanwhile.
-  if (!sound) return;
   const player = byId("player");
   player.hidden = false;
   player.src = sound.address;

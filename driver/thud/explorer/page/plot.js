@@ -9,15 +9,14 @@ const MARKS = [
 ];
 /** Number of styles of curves. */
 export const STYLES = 6;
-// Width of a letter and height of a line, px.
+// Width of a letter, px.
 const LETTER = 6.8;
-const LINE = 17;
 const drawn = new Map();
 const watcher = new ResizeObserver((entries) => entries.forEach((entry) => redraw(entry.target)));
 
 /** Draw a plot in an element.
  *
- * `content` has a title and `curves` with name, style, x, y and the options `marks`, `thin` and
+ * `content` has `curves` with name, style, x, y and the options `marks`, `thin` and
  * `ends` ([low, high] of each value). The axes `x` and `y` have a title and a unit; `x.bands` is a
  * list of names of bands. `limits` are [lower, upper] of each band, and `results` are those of the
  * first curve. With `hasCursor` the first curve has the cursor of `setCursor`.
@@ -61,20 +60,6 @@ export function swatch(style, hasMarks = false) {
   const line = svgElement("g", { class: `curve style${style % STYLES}` }, svgElement("path", { d: "M0 6h26" }));
   if (hasMarks) line.append(MARKS[style % MARKS.length](13, 6));
   return svgElement("svg", { width: 26, height: 12, "aria-hidden": "true", class: "swatch" }, line);
-}
-
-/** Return the image of a content with a legend of several curves, for files. */
-export function imageOf(content, width, height) {
-  const { image } = drawCurves(content, width, height);
-  const { curves } = content;
-  if (curves.length < 2) return image;
-  setUp(image, { height: height + LINE * curves.length + 6 });
-  for (const [i, { name, style }] of curves.entries()) {
-    const y = height + LINE * i + 12;
-    const line = svgElement("path", { d: `M50 ${y - 4}h26` });
-    image.append(svgElement("g", { class: `curve style${style % STYLES}` }, line), text(82, y, name));
-  }
-  return image;
 }
 
 function redraw(host) {

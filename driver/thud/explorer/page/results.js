@@ -58,7 +58,6 @@ function showForces(variants, { thirds }) {
   const bands = levelsOf(first).frequency;
   const octavesOf = ({ answer }) => answer.criteria.filter(({ band }) => band);
   plot(byId("levels"), {
-    title: "Force exposure level",
     curves: variants.map((variant) => ({
       name: variant.label, style: variant.style, x: bands.map((_, k) => k), marks: true,
       y: levelsOf(variant).level, ends: thirds ? undefined : octavesOf(variant).map(endsOf),
@@ -70,7 +69,7 @@ function showForces(variants, { thirds }) {
   });
   byId("force_title").textContent = FORCES[first.answer.force.kind ?? "floor"];
   plot(byId("force"), {
-    title: byId("force_title").textContent, hasCursor: true,
+    hasCursor: true,
     curves: variants.flatMap(({ label, style, answer: { force, floor } }) => [
       { name: label, style, x: force.time, y: force.value },
       floor && { name: `${label}, on the floor`, style, x: floor.force.time, y: floor.force.value, thin: true },
@@ -88,7 +87,6 @@ function showRooms(variants) {
   if (!hasRoom) return;
   const { frequency: bands, contributions } = rooms[0].answer.room;
   plot(byId("room"), {
-    title: "Level in the room below",
     curves: rooms.map(({ label, style, answer: { room } }) => ({
       name: label, style, x: room.level.map((_, k) => k), marks: true, y: room.level,
       ends: room.level.map((level, k) => [level - room.uncertainty[k], level + room.uncertainty[k]]),
@@ -155,7 +153,6 @@ export function showFloors(variants) {
   const { name, octaves } = floors[0].answer.floor;
   byId("floor_title").textContent = `Floor response: ${name}`;
   plot(byId("velocity"), {
-    title: "Velocity of the floor",
     curves: floors.map(({ label, style, answer: { floor: { velocity } } }) =>
       ({ name: label, style, x: velocity.time, y: velocity.value })),
     x: { title: "Time", unit: "ms" }, y: { title: "Velocity of the floor", unit: "mm/s", zero: true },

@@ -36,8 +36,6 @@ export function nameVariants(variants) {
   const seen = new Map();
   for (const variant of variants) {
     if (!variant.values) variant.label = variant.title ?? variant.name;
-    // An image of a plot holds neither control characters nor halves of characters.
-    variant.label = variant.label.replace(/[\p{Cc}\p{Cs}\uFFFE\uFFFF]/gu, "");
     const count = (seen.get(variant.label) ?? 0) + 1;
     seen.set(variant.label, count);
     if (count > 1) variant.label += ` (${count})`;
