@@ -147,11 +147,8 @@ def test_results_that_cannot_be_saved_are_told(
     case_file: CaseFile, tmp_path: Path, errors_of: ErrorsOf
 ) -> None:
     (tmp_path / "file").write_text("")
-    assert "file/drawn" in errors_of("run", "-q", str(case_file(MINIMAL)), "-o", "file/drawn")
-
-
-def test_empty_output_is_told(case_file: CaseFile, errors_of: ErrorsOf) -> None:
-    assert "--output" in errors_of("run", "-q", "-o", " ", case_file(MINIMAL))
+    for folder, word in (("file/drawn", "file/drawn"), (" ", "--output")):
+        assert word in errors_of("run", "-q", str(case_file(MINIMAL)), "-o", folder)
 
 
 def test_figure_that_cannot_be_replaced_is_named(
@@ -231,22 +228,6 @@ def test_cases_of_one_name_do_not_replace_each_other(
         errors_of("run", "-q", "--no-figures", first, second, "-o", "out"),
     )
     assert thud.read_results("out/ball").case.drop.height == 1.0
-
-
-def test_interrupted_fit_does_not_say_that_it_is_kept(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, errors_of: ErrorsOf
-) -> None:
-    def interrupt(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("thud.studies.fit.search", interrupt)
-    (tmp_path / "study.toml").write_text(
-        "parameters.mass = {}\n[target]\nlevels = [39, 31, 23, 17, 12]"
-    )
-    errors = errors_of("fit", "-q", "study.toml", code=130)
-    assert "interrupted" in errors
-    assert "kept" not in errors
-    assert not list(tmp_path.glob("outputs/study/*"))
 
 
 def test_screen_without_the_letters_of_a_name_shows_their_codes(

@@ -63,7 +63,7 @@ class Results:
 
         Without names, they are not known yet, and are checked when the directory is replaced.
         """
-        self._ask("check_results", names=_lines(names))
+        self._ask("check_results", names=_lines(*names))
 
     @contextmanager
     def new_folder(self) -> Iterator[Path]:
@@ -100,21 +100,17 @@ class Results:
 
     def _ask(self, question: str, **more: bytes) -> dict[str, Any]:
         return ask(
-            question, path=_encoded(self.folder), command=self.command, subject=self.subject,
-            replace=self.replace, inputs=_lines(self.inputs), **more,
+            question, path=_lines(self.folder), command=self.command, subject=self.subject,
+            replace=self.replace, inputs=_lines(*self.inputs), **more,
         )  # fmt: skip
 
 
-def _lines(paths: Iterable[str | os.PathLike[str]]) -> bytes:
-    """Return paths as the lines of a text of a request."""
-    return b"\n".join(map(_encoded, paths))
-
-
-def _encoded(path: str | os.PathLike[str]) -> bytes:
-    """Return a path for a request; raise InputError if it has line ends or zero bytes."""
-    if {"\n", "\0"} & {*os.fsdecode(path)}:
-        refuse(f"{os.fsdecode(path)!r} is not allowed", "a path in one line without zero bytes")
-    return os.fsencode(path)
+def _lines(*paths: str | os.PathLike[str]) -> bytes:
+    """Return paths as lines for a request; raise InputError for line ends and zero bytes."""
+    for path in map(os.fsdecode, paths):
+        if {"\n", "\0"} & {*path}:
+            refuse(f"{path!r} is not allowed", "a path in one line without zero bytes")
+    return b"\n".join(map(os.fsencode, paths))
 
 
 def is_one_of(path: Path, others: Iterable[str | os.PathLike[str]]) -> bool:

@@ -22,7 +22,6 @@ from thud.cli import (  # noqa: F401 - the modules of the commands
 from thud.cli.command import (
     COMMANDS,
     FILE_KINDS,
-    FINISHED_ARE_KEPT,
     exit_code,
     kind_of,
     message_of,
@@ -41,26 +40,23 @@ INTERRUPTED = 128
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command with arguments, by default those of this process; return the exit code."""
-    after_interrupt = FINISHED_ARE_KEPT
     try:
         options = _parse(sys.argv[1:] if arguments is None else arguments)
         if isinstance(options, int):
             code = options
         else:
-            command = COMMANDS[options.name]
-            after_interrupt = command.after_interrupt
             folder = getattr(options, "output", None)
             if folder is not None and not folder.strip():
                 refuse("--output has no value", "a path")
             with print_immediately():
-                code = command.function(options)
+                code = COMMANDS[options.name].function(options)
         print(end="", flush=True)
     except BrokenPipeError:
         # The reader of the output has ended, such as `head`.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = InputError.exit_code
     except KeyboardInterrupt as interrupt:
-        print_error(f"interrupted; {after_interrupt}")
+        print_error("interrupted")
         return INTERRUPTED + next(iter(interrupt.args), signal.SIGINT)
     except (ThudError, OSError) as error:
         if isinstance(error, OSError) and error.filename is None:

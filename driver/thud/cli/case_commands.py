@@ -188,7 +188,6 @@ def _figures(answer: Bundle, options: argparse.Namespace) -> dict[str, bytes]:
     argument("--source", choices=SOURCES,
              help="source of the limits (default: &limits source of the cases)"),
     QUIET,
-    after_interrupt="nothing is written",
 )  # fmt: skip
 def compare_cases(options: argparse.Namespace) -> int:
     """Compare cases and recordings; return the exit code."""
@@ -256,7 +255,6 @@ def _read_source(path: str, config: str | None) -> ImpactResult:
     argument("directory", nargs="?", default="inputs", metavar="DIR",
              help="new directory (default: inputs)"),
     QUIET,
-    after_interrupt="copied files are kept",
 )  # fmt: skip
 def copy_examples(options: argparse.Namespace) -> int:
     """Copy the inputs into a directory of their own; return the exit code."""

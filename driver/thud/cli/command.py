@@ -29,30 +29,26 @@ if TYPE_CHECKING:
 NOT_CONFORMING = 3
 # Names or flags of an argument, and its keywords for `add_argument`.
 Argument = tuple[tuple[str, ...], dict[str, Any]]
-FINISHED_ARE_KEPT = "finished results are kept"
 
 
 class Command(NamedTuple):
-    """A command; `after_interrupt` is its message after an interrupt."""
+    """A command."""
 
     help: str
     arguments: tuple[Argument, ...]
     # Returns the exit code.
     function: Function
-    after_interrupt: str
 
 
 # All commands by their names, in the order of the help.
 COMMANDS: dict[str, Command] = {}
 
 
-def command(
-    name: str, meaning: str, *arguments: Argument, after_interrupt: str = FINISHED_ARE_KEPT
-) -> Callable[[Function], Function]:
+def command(name: str, meaning: str, *arguments: Argument) -> Callable[[Function], Function]:
     """Make a function the command of a name; see `Command`."""
 
     def add(function: Function) -> Function:
-        COMMANDS[name] = Command(meaning, arguments, function, after_interrupt)
+        COMMANDS[name] = Command(meaning, arguments, function)
         return function
 
     return add

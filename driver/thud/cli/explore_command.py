@@ -35,7 +35,6 @@ ALL_ADDRESSES = {"0.0.0.0": "localhost", "[::]": "[::1]"}  # noqa: S104 - only c
     option("--port", "PORT", "port to listen on (default: any free port)", type=int, default=0),
     flag("--no-browser", "only print the address"),
     QUIET,
-    after_interrupt="nothing is written",
 )  # fmt: skip
 def explore(options: argparse.Namespace) -> int:
     """Serve the page until interrupted; return the exit code."""

@@ -111,7 +111,6 @@ _FLOORS = (
            "contain the words", nargs="?", const=""),
     *output("the page (default: outputs/floors)"),
     QUIET,
-    after_interrupt="nothing is written",
 )  # fmt: skip
 def compare_floor_cases(options: argparse.Namespace) -> int:
     """Compare floors, print the table and save the page; return the exit code.
@@ -141,7 +140,6 @@ def compare_floor_cases(options: argparse.Namespace) -> int:
     option("--client", "TEXT", "client, on the first page of the report"),
     *output("the results (default: outputs/prediction)"),
     QUIET,
-    after_interrupt="nothing is written",
 )  # fmt: skip
 def predict(options: argparse.Namespace) -> int:
     """Predict the levels below floors, print and save them; return the exit code."""

@@ -144,7 +144,6 @@ OF_A_FORCE = ("mass", "force", "gravity", "uncertainty", "unit")
     option("--channel", "NAME|NUMBER", "channel of the force"),
     option("--unit", "UNIT", "unit of the recorded values, if the file does not state it"),
     QUIET,
-    after_interrupt="nothing is written",
 )  # fmt: skip
 def run_calibrate(options: argparse.Namespace) -> int:
     """Print the configuration lines of a calibration record; return the exit code."""

@@ -89,7 +89,6 @@ for _name, _kind in KINDS.items():
     *output("the results (default: outputs/<study name>)"),
     NO_FIGURES,
     QUIET,
-    after_interrupt="nothing is written",
 )
 def fit(options: argparse.Namespace) -> int:
     """Run a fit, save files and figures, print its results; return the exit code."""
