@@ -6,7 +6,6 @@ from .base.errors import (
     PlausibilityWarning as PlausibilityWarning,
     ThudError as ThudError,
 )
-from .base.units import quantity as quantity
 from .case.case import (
     Case as Case,
     read_case as read_case,

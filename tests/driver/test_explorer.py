@@ -404,17 +404,8 @@ def test_load_cells_are_named_like_the_fields(client: TestClient) -> None:
     assert warnings
 
 
-<<<<<<< HEAD
-@pytest.mark.parametrize("name", ["../../etc/passwd.wav", "x.exe", "a\0b.wav", "", "x" * 5000])
-def test_hostile_recordings_get_a_sentence(client: TestClient, name: str) -> None:
-    response = client.post("/measure", **form_of(b"\0" * 100, {"name": name}))
-    report = response.json()
-    assert report.keys() == {"error", "field"}
-    assert "/recording" not in report["error"]
-=======
 # Names of files that are no plain names.
 NAMES = ["../../etc/passwd.wav", "x.exe", "a\0b.wav", "", "x" * 5000]
->>>>>>> 58cdff36 (Send layers of a floor and warnings of a recording as they are)
 
 
 @pytest.mark.parametrize(
@@ -432,13 +423,9 @@ def test_requests_that_are_no_forms_get_a_sentence(
     client: TestClient, kind: str, content: bytes
 ) -> None:
     response = client.post("/measure", content=content, headers={"Content-Type": kind})
-<<<<<<< HEAD
-    assert response.json().keys() == {"error", "field"}
-=======
     report = response.json()
     assert report.keys() == {"error", "field"}
     assert "/" not in report["error"]
->>>>>>> 58cdff36 (Send layers of a floor and warnings of a recording as they are)
 
 
 RECORDINGS = REPOSITORY / "inputs/recordings"
@@ -1007,16 +994,6 @@ def test_page_that_leaves_while_it_waits_ends_its_work(path: str) -> None:
         finally:
             ended.append(path)
 
-<<<<<<< HEAD
     application.state.jobs.run = work
-
-    async def leave() -> None:
-        receive = leaving_after({"type": "http.request", "body": json.dumps(SHELL).encode()})
-        await asyncio.wait_for(application(scope_of(path), receive, discard), 20)
-
-    asyncio.run(leave())
-=======
-    application.state.quick.run = application.state.slow.run = work
     leave(application, path, json.dumps(SHELL).encode())
->>>>>>> 58cdff36 (Send layers of a floor and warnings of a recording as they are)
     assert ended == [path]

@@ -15,9 +15,7 @@ import pytest
 from conftest import REPOSITORY, naming, python
 
 import thud
-from thud.base import units
-from thud.base._schema import KEYS, MODELS
-from thud.studies.parameter import read_fitted
+from thud.base._schema import MODELS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -227,36 +225,3 @@ def test_model_may_be_an_object() -> None:
 def test_standard_ball_conforms(flagship: thud.Impact) -> None:
     assert flagship.assess()
     assert flagship.notes == ()
-
-
-@pytest.mark.parametrize(
-    ("text", "value"),
-    [("32 mm", 0.032), ("2.08MPa", 2.08e6), (" -1e3 ms", -1.0), ("5 %", 0.05), ("20 degC", 20.0)],
-)
-def test_quantity_is_in_si_units(text: str, value: float) -> None:
-    assert thud.quantity(text) == value
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("32", naming("'32'", "unit", "cm", "mm")),
-        ("32 MM", naming("'MM'", "'mm'", "cm")),
-        ("5 inch", naming("'5 inch'", "'inch'", "cm")),
-        ("5 m m", naming("'m m'", "cm")),
-        ("mm", naming("'mm'", "'32 mm'")),
-        ("1e999 m", naming("'1e999 m'")),
-        ("nan m", naming("'nan m'")),
-    ],
-)
-def test_quantity_does_not_guess(text: str, words: str) -> None:
-    with pytest.raises(thud.InputError, match=words):
-        thud.quantity(text)
-
-
-@pytest.mark.parametrize("name", ["height", "youngs_modulus", "mass", "sample_rate", "duration"])
-def test_quantity_takes_the_units_of_studies(name: str) -> None:
-    (unit,) = {key.unit for key in KEYS if key.name == name}
-    for multiple in set(units.SIZES[unit]) - {"min", "h"}:
-        parameter = read_fitted(name, {"start": 3.1, "unit": multiple}, thud.Case())
-        assert thud.quantity(f"3.1 {multiple}") == parameter.start

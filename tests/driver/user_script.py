@@ -13,7 +13,7 @@ import thud
 
 folder = Path(mkdtemp())
 names: tuple[thud.ModelName, ...] = ("hollow_sphere", "modal_ball")
-ball = thud.Ball(outer_radius=thud.quantity("8.9 cm"))
+ball = thud.Ball(outer_radius=0.089)
 impacts: dict[str, thud.Impact] = {name: thud.solve(ball, model=name) for name in names}
 lumped: thud.ModelOptions = thud.HuntCrossley(contact_time=0.02, restitution=0.8)
 tyre: thud.ModelOptions = thud.TwoMass(belt_mass=1.0)

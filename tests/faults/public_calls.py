@@ -64,7 +64,6 @@ def fast_calls(folder: Path) -> Calls:
             thud.assess_levels([39, 31, 23, 17, 12], 0.02, 0.8, 1, 2.5, 1.0)
         ),
         "get_bands": lambda: thud.get_bands("third").nominal,
-        "quantity": lambda: thud.quantity("8.9 cm"),
         "loss_factors": lambda: thud.loss_factors(thud.FiniteElement(), [50.0, 100.0]),
         "mobility": lambda: thud.mobility(PLATE, [25.0, 100.0]).values,
         "ball_impedance": lambda: str(thud.ball_impedance(light, [1e4, 1e5])),

@@ -3,15 +3,11 @@
 from __future__ import annotations
 
 import math
-import re
 from decimal import Decimal
 
 from thud.base.checks import (
     refuse,
-    refuse_value,
     require_choice,
-    require_kind,
-    require_number,
     shown,
 )
 
@@ -66,8 +62,6 @@ _WORDS = {
 }  # fmt: skip
 SPELLINGS = {word: unit for unit, words in _WORDS.items() for word in words.split()}
 _PLAIN = str.maketrans("\u00b5\u03bc\u00b2\u00b3", "uu23", " *\u00b7\u22c5^\u00a0")
-# The number at the beginning of a quantity.
-NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)")
 # Units of tables and figures, ascending.
 DISPLAY_UNITS = {
     "Pa": ("Pa", "kPa", "MPa", "GPa"), "m": ("mm", "m"), "s": ("ms", "s"), "Hz": ("Hz", "kHz"),
@@ -122,34 +116,6 @@ def power_of(unit: object, key_unit: str, label: str) -> int:
     powers = {unit: round(math.log10(size)) for unit, size in sizes.items()}
     powers = {unit: power for unit, power in powers.items() if scaled(1.0, power) == sizes[unit]}
     return powers[require_choice(f"{label}: unit", unit, powers)]
-
-
-def quantity(text: str) -> float:
-    """Return a number with a unit in SI units; temperatures in degC.
-
-    Parameters
-    ----------
-    text
-        Number and unit, such as ``"32 mm"``.
-
-    Raises
-    ------
-    InputError
-        If the number is not finite, or the unit is unknown.
-
-    Examples
-    --------
-    >>> quantity("32 mm")
-    0.032
-    """
-    require_kind("quantity", text, str)
-    units = {unit: size for sizes in SIZES.values() for unit, size in sizes.items()}
-    match = NUMBER.match(text)
-    if match is None:
-        refuse_value("quantity", text, "a number and its unit, such as '32 mm'")
-    unit = require_choice(f"quantity {shown(text)}: unit", text[match.end() :].strip(), units)
-    value = float(Decimal(repr(float(match[1]))) * Decimal(repr(units[unit])))
-    return require_number(f"quantity {shown(text)}", value) + 0.0
 
 
 def scaled(value: float, power: int) -> float:
