@@ -101,7 +101,11 @@ def allowed(key: Entry) -> str:
         return ", ".join(f'"{choice}"' for choice in key["choices"])
     if "lower" not in key:
         return ""
-    ends = [end if isinstance(end, str) else f"{end:g}" for end in (key["lower"], key["upper"])]
+    # As the library writes limits: 1e6.
+    ends = [
+        end if isinstance(end, str) else f"{end:g}".replace("e+0", "e").replace("e+", "e")
+        for end in (key["lower"], key["upper"])
+    ]
     signs = ["<" if key[open_] else "<=" for open_ in ("lower_open", "upper_open")]
     return f"{ends[0]} {signs[0]} {key['name']} {signs[1]} {ends[1]}"
 

@@ -98,16 +98,16 @@ class Ball(Group):
     wall_thickness : float
         Wall thickness, less than the outer radius, m; 0 < wall_thickness < outer_radius.
     mass : float
-        Mass, kg; 1e-12 <= mass <= 1e+06.
+        Mass, kg; 1e-12 <= mass <= 1e6.
     youngs_modulus : float | None
-        Modulus of elasticity, Pa; 0 < youngs_modulus <= 1e+13; None: that of the standard ball by
+        Modulus of elasticity, Pa; 0 < youngs_modulus <= 1e13; None: that of the standard ball by
         the model.
     poisson_ratio : float | None
         Poisson's ratio; -1 < poisson_ratio <= 0.5; None: that of the standard ball by the model.
     gauge_pressure : float
-        Overpressure of the gas in the undeformed ball, Pa; 0 <= gauge_pressure <= 1e+08.
+        Overpressure of the gas in the undeformed ball, Pa; 0 <= gauge_pressure <= 1e8.
     ambient_pressure : float
-        Pressure of the air around the ball, Pa; 0 <= ambient_pressure <= 1e+08.
+        Pressure of the air around the ball, Pa; 0 <= ambient_pressure <= 1e8.
     heat_capacity_ratio : float
         Ratio of specific heats of the enclosed gas; 1 <= heat_capacity_ratio <= 2.
     """
@@ -129,7 +129,7 @@ class Drop(Group):
     Attributes
     ----------
     height : float
-        Height of the ball's lowest point above the floor, m; 1e-12 <= height <= 1e+06.
+        Height of the ball's lowest point above the floor, m; 1e-12 <= height <= 1e6.
     gravity : float
         Acceleration of free fall, m/s2; 1e-12 <= gravity <= 1000.
     """
@@ -145,7 +145,7 @@ class Sampling(Group):
     Attributes
     ----------
     sample_rate : float
-        Samples per second; from 16000 with finite_element, Hz; 2000 <= sample_rate <= 1e+07.
+        Samples per second; from 16000 with finite_element, Hz; 2000 <= sample_rate <= 1e7.
     duration : float
         Duration of the record from first touch, s; 0.001 <= duration <= 10.
     substeps : int
@@ -234,12 +234,12 @@ class Unknowns(Group):
     key : sequence of str
         Keys of ball, drop and model whose values are not known.
     low : sequence of float
-        Their minima, in the units of the keys; -1e+30 <= low <= 1e+30.
+        Their minima, in the units of the keys; -1e30 <= low <= 1e30.
     high : sequence of float
-        Their maxima; -1e+30 <= high <= 1e+30.
+        Their maxima; -1e30 <= high <= 1e30.
     standard_deviation : sequence of float
         Standard deviations around the values of the case, truncated by low and high; 0: uniform; 0
-        <= standard_deviation <= 1e+30.
+        <= standard_deviation <= 1e30.
     reason : sequence of str
         Reasons of the ranges, with their sources.
     """
@@ -442,7 +442,7 @@ class FiniteElement(Group):
         standard ball by the model; group ``&contact``.
     layer_stiffness : float
         Stiffness per area of a thin layer on the floor; 0: hard floor without a layer, N/m3; 0 <=
-        layer_stiffness <= 1e+13; group ``&contact``.
+        layer_stiffness <= 1e13; group ``&contact``.
     snapshot_interval : float
         Time between snapshots of the deformed ball; 0: none, s; 0 <= snapshot_interval <= 10;
         group ``&output``.
@@ -491,11 +491,11 @@ class MeasuredModes(Group):
     Attributes
     ----------
     frequency : sequence of float
-        Natural frequencies of the ball on the floor, Hz; 0.001 <= frequency <= 1e+06.
+        Natural frequencies of the ball on the floor, Hz; 0.001 <= frequency <= 1e6.
     damping_ratio : sequence of float
         Damping ratios, one per mode; 0 <= damping_ratio < 1.
     effective_mass : sequence of float
-        Effective masses, one per mode, kg; 1e-12 <= effective_mass <= 1e+06.
+        Effective masses, one per mode, kg; 1e-12 <= effective_mass <= 1e6.
     allow_mass_mismatch : bool
         Effective masses need not add up to the mass of the ball.
     """
@@ -514,7 +514,7 @@ class HuntCrossley(Group):
     Attributes
     ----------
     stiffness : float
-        Contact stiffness, N/m^exponent; 0: derived from contact_time; 0 <= stiffness <= 1e+15.
+        Contact stiffness, N/m^exponent; 0: derived from contact_time; 0 <= stiffness <= 1e15.
     contact_time : float
         Target contact time; 0: derived from stiffness, s; 0 <= contact_time <= 10.
     exponent : float
@@ -540,14 +540,14 @@ class TwoMass(Group):
     Attributes
     ----------
     belt_mass : float
-        Mass of belt and tread, less than the mass of the source, kg; 0 < belt_mass < 1e+06.
+        Mass of belt and tread, less than the mass of the source, kg; 0 < belt_mass < 1e6.
     inflation_pressure : float
-        Inflation pressure, Pa; 0 <= inflation_pressure <= 1e+08.
+        Inflation pressure, Pa; 0 <= inflation_pressure <= 1e8.
     contact_width : float
         Contact area divided by deflection of the contact patch, m; 0 <= contact_width <= 100.
     carcass_stiffness : float
         Force of the carcass divided by its deflection, at 20 mm, N/m; 0 <= carcass_stiffness <=
-        1e+12.
+        1e12.
     carcass_exponent : float
         Exponent of the deflection in the force of the carcass; 1.5 <= carcass_exponent <= 5.
     contact_damping : float
@@ -555,7 +555,7 @@ class TwoMass(Group):
         contact_damping <= 100.
     belt_frequency : float
         Natural frequency of the belt on the sidewall with fixed rim, Hz; 0 < belt_frequency <=
-        1e+06.
+        1e6.
     belt_damping : float
         Damping ratio of the belt on the sidewall with fixed rim; 0 <= belt_damping <= 10.
     """
@@ -586,10 +586,10 @@ class RectangularFloor(Group):
         Support of the edges; "unknown", "simple", "clamped", "free", "elastic".
     support_stiffness : sequence of float
         Stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length,
-        y at 0 and width), N/m2; 0 <= support_stiffness <= 1e+14.
+        y at 0 and width), N/m2; 0 <= support_stiffness <= 1e14.
     support_rotation : sequence of float
         Stiffness of elastic edges against rotation per length: 1 or 4 values, N; 0 <=
-        support_rotation <= 1e+14.
+        support_rotation <= 1e14.
     line_x : sequence of float
         Positions along the length of walls or beams on which the floor rests, m; 0 < line_x < 100.
     line_y : sequence of float
@@ -604,7 +604,7 @@ class RectangularFloor(Group):
         Loss factor of the floating plate; 0 <= screed_loss_factor <= 1.
     layer_stiffness : float
         Dynamic stiffness of the resilient layer per unit area (ISO 9052-1), N/m3; 10000 <=
-        layer_stiffness <= 1e+12.
+        layer_stiffness <= 1e12.
     layer_loss_factor : float
         Loss factor of the resilient layer; 0 <= layer_loss_factor <= 1.
     subceiling_thickness : float
@@ -613,13 +613,12 @@ class RectangularFloor(Group):
     subceiling_density : float
         Density of the subceiling, kg/m3; 10 <= subceiling_density <= 20000.
     subceiling_modulus : float
-        Modulus of elasticity of the subceiling in bending, Pa; 1e+07 <= subceiling_modulus <=
-        1e+12.
+        Modulus of elasticity of the subceiling in bending, Pa; 1e7 <= subceiling_modulus <= 1e12.
     subceiling_loss_factor : float
         Loss factor of the subceiling; 0 <= subceiling_loss_factor <= 1.
     channel_stiffness : float
         Stiffness per length of each line that holds the subceiling (channels, battens, hangers),
-        N/m2; 0 <= channel_stiffness <= 1e+12.
+        N/m2; 0 <= channel_stiffness <= 1e12.
     channel_loss_factor : float
         Loss factor of these lines; 0 <= channel_loss_factor <= 1.
     cavity_depth : float
@@ -627,7 +626,7 @@ class RectangularFloor(Group):
     cavity_loss_factor : float
         Loss factor of this air, high with absorber in it; 0 <= cavity_loss_factor <= 1.
     covering_stiffness : float
-        Stiffness of a covering under the source; 0: none, N/m; 0 <= covering_stiffness <= 1e+12.
+        Stiffness of a covering under the source; 0: none, N/m; 0 <= covering_stiffness <= 1e12.
     covering_loss_factor : float
         Loss factor of the covering at 50 Hz; 0.01 <= covering_loss_factor <= 2.
     covering_improvement : sequence of float
@@ -681,7 +680,7 @@ class InfinitePlate(Group):
     Attributes
     ----------
     resistance : float
-        Driving-point resistance: force divided by velocity, N s/m; 1 <= resistance <= 1e+15.
+        Driving-point resistance: force divided by velocity, N s/m; 1 <= resistance <= 1e15.
     """
 
     name: ClassVar[FloorName] = "infinite_plate"
@@ -695,11 +694,11 @@ class Oscillator(Group):
     Attributes
     ----------
     mass : float
-        Moving mass under the source, kg; 0.001 <= mass <= 1e+12.
+        Moving mass under the source, kg; 0.001 <= mass <= 1e12.
     stiffness : float
-        Stiffness of the support, N/m; 0 <= stiffness <= 1e+15.
+        Stiffness of the support, N/m; 0 <= stiffness <= 1e15.
     damping : float
-        Damping coefficient of the support, N s/m; 0 <= damping <= 1e+12.
+        Damping coefficient of the support, N s/m; 0 <= damping <= 1e12.
     """
 
     name: ClassVar[FloorName] = "oscillator"
@@ -770,13 +769,13 @@ class LaminateFloor(RectangularFloor):
         Thicknesses of the crossed layers from the top (default: 40, 20, 40, 20, 40 mm), m; 0.003
         <= layer_thickness <= 0.5.
     youngs_modulus : float
-        Modulus of elasticity along the grain, Pa; 1e+08 <= youngs_modulus <= 1e+12.
+        Modulus of elasticity along the grain, Pa; 1e8 <= youngs_modulus <= 1e12.
     cross_modulus : float
-        Modulus of elasticity across the grain, Pa; 0 <= cross_modulus <= 1e+12.
+        Modulus of elasticity across the grain, Pa; 0 <= cross_modulus <= 1e12.
     shear_modulus : float
-        Shear modulus along the grain, Pa; 1e+06 <= shear_modulus <= 1e+12.
+        Shear modulus along the grain, Pa; 1e6 <= shear_modulus <= 1e12.
     rolling_shear_modulus : float
-        Modulus of rolling shear, Pa; 1e+06 <= rolling_shear_modulus <= 1e+12.
+        Modulus of rolling shear, Pa; 1e6 <= rolling_shear_modulus <= 1e12.
     torsion_factor : float
         Fraction of the torsional stiffness that joints between boards leave; 0 <= torsion_factor
         <= 1.
@@ -821,7 +820,7 @@ class JoistFloor(RectangularFloor):
     sheathing_density : float
         Density of the sheathing, kg/m3; 10 <= sheathing_density <= 20000.
     sheathing_modulus : float
-        Modulus of elasticity of the sheathing in bending, Pa; 1e+07 <= sheathing_modulus <= 1e+12.
+        Modulus of elasticity of the sheathing in bending, Pa; 1e7 <= sheathing_modulus <= 1e12.
     spacing : float
         Distance between the axes of adjacent joists, m; joist_width < spacing < width.
     joist_width : float
@@ -831,7 +830,7 @@ class JoistFloor(RectangularFloor):
     joist_density : float
         Density of the joists, kg/m3; 10 <= joist_density <= 20000.
     joist_modulus : float
-        Modulus of elasticity of the joists, Pa; 1e+07 <= joist_modulus <= 1e+12.
+        Modulus of elasticity of the joists, Pa; 1e7 <= joist_modulus <= 1e12.
     connection : float
         Composite action of sheathing and joists over the span, 0 (loose) to 1 (glued), EN 1995-1-1
         annex B; 0 <= connection <= 1.
@@ -867,19 +866,19 @@ class MeasuredMobility(Group):
     direct : float
         Limit of the mobility at high frequencies, m/(N s); 0 <= direct <= 1000.
     pole_frequency : sequence of float
-        Magnitudes of the poles divided by 2 pi, Hz; 1e-06 <= pole_frequency <= 1e+07.
+        Magnitudes of the poles divided by 2 pi, Hz; 1e-06 <= pole_frequency <= 1e7.
     damping_ratio : sequence of float
         Damping ratios of the poles; 1 for a real pole; 1e-12 <= damping_ratio <= 1.
     residue_real : sequence of float
-        Real parts of the residues, doubled for a pair of poles, m/(N s2); -1e+12 <= residue_real
-        <= 1e+12.
+        Real parts of the residues, doubled for a pair of poles, m/(N s2); -1e12 <= residue_real <=
+        1e12.
     residue_imaginary : sequence of float
-        Imaginary parts of the residues, doubled for a pair of poles, m/(N s2); -1e+12 <=
-        residue_imaginary <= 1e+12.
+        Imaginary parts of the residues, doubled for a pair of poles, m/(N s2); -1e12 <=
+        residue_imaginary <= 1e12.
     lowest_frequency : float
         Lowest frequency of the measurement, Hz; 0 < lowest_frequency < highest_frequency.
     highest_frequency : float
-        Highest frequency of the measurement, Hz; 0 < highest_frequency <= 1e+07.
+        Highest frequency of the measurement, Hz; 0 < highest_frequency <= 1e7.
     length : float
         Length of the floor, m; 0.5 <= length <= 100.
     width : float

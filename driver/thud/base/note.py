@@ -39,9 +39,9 @@ class Note:
 
     @property
     def message(self) -> str:
-        """The fact as a sentence, after its subject if it has one that it does not name itself."""
-        is_named = self.others.get("name") == library_name(self.subject)
-        return f"{self.subject}: {self}" if self.subject and not is_named else str(self)
+        """The fact as a sentence, after its subject if it does not begin with it."""
+        names_subject = not self.subject or "text" in self.others
+        return str(self) if names_subject else f"{self.subject}: {self}"
 
     def __str__(self) -> str:
         """Return the fact as a sentence, without its subject."""

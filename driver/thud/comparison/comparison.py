@@ -77,7 +77,10 @@ class Comparison(Tabulated):
         """Warnings of all impacts; their subjects begin with the name of the impact."""
         notes = [(name, note) for name, impact in self.impacts.items() for note in impact.notes]
         return tuple(
-            replace(note, subject=f"{name}, {note.subject}".removesuffix(", "))
+            # A file has the name of its impact.
+            note
+            if Path(note.subject).stem == name
+            else replace(note, subject=f"{name}, {note.subject}".removesuffix(", "))
             for name, note in notes
             if note.is_warning
         )

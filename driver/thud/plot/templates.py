@@ -15,6 +15,8 @@ from thud.base.display import html_text
 FAMILY = "DejaVu Sans"
 # Blanks between a number and its unit, and between a sign and its number.
 _INSEPARABLE = re.compile(r"(?<=\d) (?=[^\W\d_]{1,4}\b|[%°/])| (?=[±=] )|(?<=[±=<>]) (?=\w)")
+# The sign of a negative number, not of an exponent, a range or a date.
+_NEGATIVE = re.compile(r"(?<![\w.])-(?=\d)")
 
 
 def plain(text: str) -> str:
@@ -24,10 +26,10 @@ def plain(text: str) -> str:
 
 
 def _typeset(value: Any) -> Any:  # noqa: ANN401 - of a template
-    """Return a text in one line, its units with their numbers; markup and others as they are."""
+    """Return a text in one line with its numbers as they are printed; others as they are."""
     if not isinstance(value, str) or isinstance(value, Markup):
         return value
-    return _INSEPARABLE.sub("\N{NO-BREAK SPACE}", plain(value))
+    return _INSEPARABLE.sub("\N{NO-BREAK SPACE}", _NEGATIVE.sub("\N{MINUS SIGN}", plain(value)))
 
 
 def _symbols(text: str) -> Markup:
