@@ -206,7 +206,7 @@ def test_scalars_and_defaults() -> None:
     [
         ({"radius": 1}, {}, naming("'radius'", "modal_ball", "&ball", "&drop")),
         ({"height": [1, 2], "mass": [1, 2, 3]}, {}, naming("height (2,)", "mass (3,)")),
-        ({"height": [[1]]}, {}, naming("height", "2 dimensions")),
+        ({"height": [[1]]}, {}, naming("height", "1 dimensions")),
         ({"height": [[1], [1, 2]]}, {}, naming("height", "array")),
         ({"height": ["one"]}, {}, naming("height", "real")),
         ({"height": [1j]}, {}, naming("height", "real")),

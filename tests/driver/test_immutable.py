@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
-import pickle
 import runpy
 import tempfile
 import warnings
@@ -149,9 +148,8 @@ def test_changed_levels_change_no_verdict() -> None:
     levels = recording.levels()
     levels -= 1
     drop = recording.drops[0].force
-    copied = pickle.loads(pickle.dumps(recording.average()))  # noqa: S301 - its own
     force = thud.blocked_force(recording).force
-    for array in (recording.average().level, drop, force, copied.level):
+    for array in (recording.average().level, drop, force):
         with pytest.raises(ValueError, match="read-only"):
             np.subtract(array, 1, out=array)
     assert repr(recording.assess()) == before

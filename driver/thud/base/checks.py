@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any, NoReturn, get_args
 
 import numpy as np
 
-from thud.base.errors import InputError
+from thud.base.errors import InputError, WrongTypeError
 from thud.base.immutable import plain
 from thud.base.note import Note
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Container, Iterable
+    from collections.abc import Collection, Iterable
     from types import UnionType
 
     from numpy.typing import ArrayLike, NDArray
@@ -36,9 +36,10 @@ def refuse(  # noqa: PLR0913 - the fields of a note
     value: object = None,
     low: float = math.nan,
     high: float = math.nan,
+    error: type[InputError] = InputError,
     **others: float | str,
 ) -> NoReturn:
-    """Raise InputError with a message: the name of an argument or key, its problem, the mend.
+    """Raise an error with a message: the name of an argument or key, its problem, the mend.
 
     `cause` is the exception that shows the problem, `subject` the key that would mend it, by
     default that of the name; `value`, `low` and `high` are a number and its range, `others` further
@@ -49,7 +50,7 @@ def refuse(  # noqa: PLR0913 - the fields of a note
     if isinstance(value, int | float) and not (isinstance(value, bool) or math.isnan(low)):
         number = float(value) if abs(value) <= MAX_NUMBER else math.nan
     note = Note("refused", subject or name, number, low, high, others=others)
-    raise InputError(str(note).lstrip(), note) from cause
+    raise error(str(note).lstrip(), note) from cause
 
 
 def refuse_value(name: str, value: object, allowed: str, **more: Any) -> NoReturn:  # noqa: ANN401
@@ -58,11 +59,10 @@ def refuse_value(name: str, value: object, allowed: str, **more: Any) -> NoRetur
 
 
 def require_kind(name: str, value: object, kind: type[Any] | UnionType) -> None:
-    """Raise TypeError if an argument is not of a type."""
+    """Raise WrongTypeError if an argument is not of a type."""
     if not isinstance(value, kind):
         expected = " or ".join(entry.__name__ for entry in get_args(kind) or (kind,))
-        message = f"{name} must be an object of {expected}, not {type(value).__name__}"
-        raise TypeError(message)
+        refuse(f"is of type {type(value).__name__}", expected, name=name, error=WrongTypeError)
 
 
 def require_choice(name: str, value: object, allowed: Collection[str]) -> str:
@@ -95,23 +95,20 @@ def suggestion(word: object, known: Collection[str]) -> str:
 
 
 def require_array(
-    name: str, values: ArrayLike, dimensions: Container[int], kinds: str = ""
+    name: str, values: ArrayLike, dimensions: Collection[int], kinds: str = ""
 ) -> NDArray[Any]:
     """Return an array, of real numbers as float64 if `kinds` states which NumPy has for them.
 
     Raise InputError if it is ragged or masked, or if `ndim` or the kind is not allowed.
     """
-    allowed = "one dimension" + (", or a scalar" if 0 in dimensions else "")
     try:
         array = np.asarray(values)
-    except (TypeError, ValueError) as error:  # rows of different length
-        refuse(f"{name} is not an array of numbers", allowed, error)
-    if array.ndim not in dimensions:
-        refuse(f"{name} has {array.ndim} dimensions", allowed)
-    if np.ma.is_masked(values):
-        refuse(f"{name} has masked entries", "values only")
-    if kinds and array.size and array.dtype.kind not in kinds:
-        refuse(f"{name} is not an array of real numbers", "one dimension of real numbers")
+    except (TypeError, ValueError):  # rows of different length
+        array = np.empty((0,) * 9)
+    is_other_kind = kinds and array.size and array.dtype.kind not in kinds
+    if array.ndim not in dimensions or is_other_kind or np.ma.is_masked(values):
+        allowed = f"{' or '.join(map(str, dimensions))} dimensions of real numbers, none masked"
+        refuse(f"{name} is not an array of numbers", allowed)
     return np.asarray(array, dtype=np.float64, order="C") if kinds else array
 
 

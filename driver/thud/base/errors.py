@@ -60,5 +60,9 @@ class InputError(ThudError, ValueError):
     exit_code = 1
 
 
+class WrongTypeError(InputError, TypeError):
+    """An argument or a value of a key has a wrong type."""
+
+
 class NumericalError(ThudError, ArithmeticError):
     """The computation failed."""

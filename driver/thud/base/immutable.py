@@ -21,11 +21,6 @@ class Immutable:
         for name, value in vars(self).items():
             object.__setattr__(self, name, _read_only(value))
 
-    def __setstate__(self, state: dict[str, object]) -> None:
-        """Make the arrays of a copy or a pickle read-only."""
-        vars(self).update(state)
-        Immutable.__post_init__(self)
-
 
 class Plain:
     """Base of inputs: lists and arrays become tuples, and NumPy's scalars Python's, as in files."""
@@ -44,8 +39,7 @@ def freeze(array: NDArray[Any]) -> NDArray[Any]:
 
 def _read_only(value: Any) -> Any:  # noqa: ANN401 - values of any kind
     if isinstance(value, np.ndarray) and value.flags.writeable:
-        value = value.copy()
-        value.setflags(write=False)
+        return freeze(value.copy())
     if type(value) in {list, tuple}:
         return tuple(map(_read_only, value))
     if type(value) is dict:

@@ -6,7 +6,8 @@ import math
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from thud.base.checks import refuse_value, shown
+from thud.base.checks import refuse_value
+from thud.base.errors import InputError, WrongTypeError
 from thud.base.immutable import plain
 
 if TYPE_CHECKING:
@@ -68,34 +69,32 @@ class Key:
         value = getattr(group, switch)
         return (value in values if values else bool(value)) and group.keys[switch].has_effect(group)
 
-    def require(self, value: object, *, of_file: bool = True) -> None:
+    def require(self, value: object) -> None:
         """Raise InputError if a value is not allowed, whatever the values of other keys are.
 
-        For a value that is not of a file but of Python, a wrong type is a TypeError.
+        It is a TypeError, too, if the value is of a wrong type.
         """
-        low = -math.inf if isinstance(self.lower, str) else self.lower
-        high = math.inf if isinstance(self.upper, str) else self.upper
+        # NaN, which nothing is beyond, where the limit is the value of another key or none.
+        low, high = (
+            math.nan if isinstance(limit, str) or math.isinf(limit) else limit
+            for limit in (self.lower, self.upper)
+        )
         is_list = isinstance(value, tuple) and value and self.kind in {"list", "texts"}
         entries: Any = value if is_list else (value,)
         for entry in entries:
-            if not (is_typed := type(entry) in _TYPES[self.kind]):
-                fits = False
-            elif isinstance(entry, str):
+            is_typed = type(entry) in _TYPES[self.kind]
+            if isinstance(entry, str):
                 fits = entry in self.choices if self.choices else entry.isprintable()
             else:
-                above = low < entry or (entry == low and not self.lower_open)
-                fits = above and (entry < high or (entry == high and not self.upper_open))
-            if fits:
-                continue
-            name, subject = f"&{self.group}: {self.name}", f"{self.group}.{self.name}"
-            if not (is_typed or of_file):
-                message = f"{name} = {shown(entry)} is not allowed; allowed: {self.allowed}"
-                raise TypeError(message)
-            refuse_value(
-                name, entry, self.allowed, subject=subject, low_open=self.lower_open,
-                low=low if math.isfinite(low) else math.nan, high_open=self.upper_open,
-                high=high if math.isfinite(high) else math.nan,
-            )  # fmt: skip
+                below = is_typed and (entry < low or (self.lower_open and entry == low))
+                above = is_typed and (entry > high or (self.upper_open and entry == high))
+                fits = not below and not above and entry == entry  # noqa: PLR0124 - NaN differs
+            if not (is_typed and fits):
+                refuse_value(
+                    f"&{self.group}: {self.name}", entry, self.allowed, low=low, high=high,
+                    subject=f"{self.group}.{self.name}", low_open=self.lower_open,
+                    high_open=self.upper_open, error=InputError if is_typed else WrongTypeError,
+                )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -137,9 +136,8 @@ class Group:
     def __post_init__(self) -> None:
         """Store plain values; a number or a text becomes a list of one where a list is needed.
 
-        Raise TypeError if a value is not of the type of its key or a list that has a default is
-        empty, and InputError if a value is not allowed; ranges that depend on other keys are
-        checked when the group is used.
+        Raise InputError if a value is not allowed or a list that has a default is empty; ranges
+        that depend on other keys are checked when the group is used.
         """
         for option in fields(self):  # type: ignore[arg-type]
             value, key = plain(getattr(self, option.name)), self.keys.get(option.name)
@@ -149,4 +147,4 @@ class Group:
             # The default of an optional key may be outside its range; True equals 1.
             kinds = {type(option.default), *_TYPES[key.kind]} if key else ()
             if key and not (value == option.default and type(value) in kinds):
-                key.require(value, of_file=False)
+                key.require(value)

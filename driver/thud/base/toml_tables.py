@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
@@ -102,12 +102,13 @@ class TomlTable:
     @property
     def stated(self) -> list[str]:
         """Names of the keys whose values are not the defaults."""
+        values = ((entry, getattr(self, entry.name)) for entry in fields(self))
         return [
             entry.name
-            for entry in fields(self)
-            if (value := getattr(self, entry.name)) is not None and value is not entry.default
-            # The default of keys without another one is an empty table.
-            if entry.default is not MISSING or not (isinstance(value, dict) and not value)
+            for entry, value in values
+            if not (
+                value is None or value is entry.default or (isinstance(value, dict) and not value)
+            )
         ]
 
     def require(self, *names: str) -> None:

@@ -31,7 +31,7 @@ from thud.base._schema import (
 from thud.base.bridge import ask
 from thud.base.checks import refuse, refuse_unknown, require_choice, require_kind, suggestion
 from thud.base.files import replace_file
-from thud.base.immutable import Immutable, plain
+from thud.base.immutable import Immutable
 from thud.base.toml_tables import require_table
 
 if TYPE_CHECKING:
@@ -195,12 +195,11 @@ class Case(Immutable):
                 kinds[group] = choices[name]
         attributes: dict[str, Any] = {"model": None, **content.get("case", {})}
         for attribute, kind in kinds.items():
-            keys = [key for key in kind.keys.values() if key.name in content.get(key.group, {})]
-            values = {key.name: plain(content[key.group][key.name]) for key in keys}
-            for name, value in values.items():
-                # Empty lists are allowed where they are the default.
-                if value != () or getattr(kind, name) != ():
-                    kind.keys[name].require(value)
+            values = {
+                key.name: content[key.group][key.name]
+                for key in kind.keys.values()
+                if key.name in content.get(key.group, {})
+            }
             attributes[attribute] = kind(**values)
         return cls(**attributes)
 

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from thud.base._schema import GROUPS, KEYS
 from thud.base.checks import refuse, shown, suggestion
-from thud.base.immutable import plain
 from thud.base.key import Key
 from thud.case.case import attribute_of
 
@@ -87,7 +86,6 @@ def with_values(case: Case, values: Mapping[str, object]) -> Case:
     for name, value in values.items():
         key, entry = find_key(name, case)
         changes = groups.setdefault(attribute_of(key), {})
-        key.require(plain(value))
         if entry:
             before: Any = getattr(getattr(case, attribute_of(key)), key.name)
             entries = [*(changes.get(key.name) or before)]
