@@ -100,8 +100,7 @@ from .level.rating import (
     rating as rating,
     standardized_level as standardized_level,
 )
-from .recordings.read_recording import read_recording as read_recording
-from .recordings.recording import Recording as Recording
+from .recordings.recording import Recording as Recording, read_recording as read_recording
 from .report.recording_files import write_report as write_report
 from .studies.calibrated_set import assess as assess
 from .studies.compression_fit import (

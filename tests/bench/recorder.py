@@ -40,7 +40,7 @@ from scipy.special import ndtr, stdtrit
 import thud
 from thud.base.errors import InputError
 from thud.recordings.config import Config
-from thud.recordings.response import Plate
+from thud.recordings.instruments import Plate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping

@@ -15,7 +15,7 @@ import scipy.io
 import soundfile
 
 from thud.recordings.config import Config
-from thud.recordings.signal_files import open_signals
+from thud.recordings.signal import open_signals
 
 if TYPE_CHECKING:
     from collections.abc import Callable

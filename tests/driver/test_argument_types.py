@@ -13,7 +13,7 @@ import thud
 from thud.base.key import Group
 from thud.recordings.calibration import calibrate
 from thud.recordings.config import Config, Instrument, Properties, ReportConfig
-from thud.recordings.response import Plate, RecorderFilter
+from thud.recordings.instruments import Plate, RecorderFilter
 
 if TYPE_CHECKING:
     from collections.abc import Callable

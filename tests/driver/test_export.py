@@ -19,7 +19,7 @@ from thud.base.note import Note
 from thud.cli import COMMANDS, new_parser
 from thud.cli.case_commands import KINDS
 from thud.export.force_files import EXPORTS, BlockedForce, blocked_force
-from thud.recordings.read_recording import read_recording
+from thud.recordings.recording import read_recording
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -14,8 +14,13 @@ from synthetic import make_drop
 
 import thud
 from thud.recordings.config import Config
-from thud.recordings.instruments import instrument_uncertainties, mean_level_changes
-from thud.recordings.response import Chain, Plate, RecorderFilter
+from thud.recordings.instruments import (
+    Chain,
+    Plate,
+    RecorderFilter,
+    instrument_uncertainties,
+    mean_level_changes,
+)
 from thud.recordings.signal import Signal
 
 RATE = 48_000.0

@@ -23,8 +23,7 @@ import thud
 from thud import cli
 from thud.recordings.checks.plate import check_plate
 from thud.recordings.config import Config, read_config
-from thud.recordings.instruments import AMPLITUDE_DECIBEL
-from thud.recordings.response import Plate
+from thud.recordings.instruments import AMPLITUDE_DECIBEL, Plate
 from thud.recordings.signal import Signal
 from thud.report.contents import report_data
 

@@ -9,7 +9,7 @@ import pytest
 from conftest import naming
 
 import thud
-from thud.recordings import table
+from thud.recordings.formats import text as table
 from thud.studies.fitting.force_record import read_record, time_and_force
 
 if TYPE_CHECKING:

@@ -19,9 +19,9 @@ from thud.recordings.background import (
     remove_background,
     uniform_cells,
 )
-from thud.recordings.checks.force import check_aliasing
 from thud.recordings.contact import Contact, find_contact
 from thud.recordings.drops import Section
+from thud.recordings.repair import check_aliasing
 from thud.recordings.signal import Signal
 
 RATE = 25600.0

@@ -15,8 +15,6 @@ from scipy.ndimage import median_filter
 
 import thud
 from thud.base.errors import InputError
-from thud.recordings import checks
-from thud.recordings.checks import force as force_checks
 from thud.recordings.config import Config
 from thud.recordings.signal import Signal
 
@@ -173,13 +171,6 @@ def test_equal_samples_of_steps_or_of_a_lower_rate_are_not_held(noise: float, re
     force = np.repeat(np.round(drop_force(48e3 / repeats, noise=noise)), repeats)
     (drop,) = measured(force, 48e3).drops
     assert "spikes" not in codes(drop.notes)
-
-
-def test_each_check_of_a_drop_is_listed_and_says_what_it_protects_from() -> None:
-    listed = {*checks.CELL_CHECKS, *checks.SECTION_CHECKS, *checks.CONTACT_CHECKS}
-    named = {value for name, value in vars(force_checks).items() if name.startswith("check")}
-    assert named - {force_checks.check_cells} == listed
-    assert all("dB" in str(check.__doc__) for check in listed)
 
 
 def later(force: np.ndarray, share: float) -> np.ndarray:

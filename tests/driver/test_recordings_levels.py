@@ -24,7 +24,7 @@ from thud.recordings.checks.outliers import find_outliers
 from thud.recordings.checks.plate import check_plate
 from thud.recordings.config import Config
 from thud.recordings.contact import band_noise
-from thud.recordings.instruments import instrument_uncertainties
+from thud.recordings.instruments import Chain, Plate, correct_force, instrument_uncertainties
 from thud.recordings.recorded_levels import (
     AverageLevels,
     DropLevels,
@@ -32,7 +32,6 @@ from thud.recordings.recorded_levels import (
     compare_methods,
     measure_levels,
 )
-from thud.recordings.response import Chain, Plate, correct_force
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -17,7 +17,7 @@ from thud.recordings.config import Config
 from thud.recordings.contact import band_noise
 from thud.recordings.drops import Quantization, Section
 from thud.recordings.quantities import GRAVITY, drop_estimates
-from thud.recordings.read_recording import measure_stages, read_recording
+from thud.recordings.recording import measure_stages, read_recording
 from thud.recordings.repair import find_quantization
 from thud.recordings.signal import Signal
 

@@ -38,7 +38,7 @@ from thud.recordings.calibration import calibrate
 from thud.recordings.config import Config, Instrument, Properties, ReportConfig, read_config
 from thud.recordings.force_units import Calibration, newtons_per_unit
 from thud.recordings.formats.text import read_channels
-from thud.recordings.response import Plate, RecorderFilter
+from thud.recordings.instruments import Plate, RecorderFilter
 from thud.recordings.signal import Signal, find_peaks, orient
 
 if TYPE_CHECKING:
@@ -342,6 +342,32 @@ def test_headers_of_loggers(head: str, row: str, coding: str, end: str, tmp_path
     assert signal.calibration == "values in kN"
 
 
+@pytest.mark.parametrize(
+    ("head", "row", "rate"),
+    [
+        ("fs: 8000\nNo;Force [N]\n", "{i};{v:g}", 8000.0),  # numbers of samples are no times
+        ("fs: 8000\nGain;1,0\nNo;Force [N]\n", "{i};{v:g}", 8000.0),
+        ("fs: 8000\nGain;10\nNo;Force [N]\n", "{i};{v:g}", None),
+        ("fs: 8000\nOffset;0;0.5\nNo;Force [N]\n", "{i};{v:g}", None),
+        ("fs: 8000\nSensitivity = 4.1 mV/N\nForce\n", "{v:g}", None),
+        ("fs: 8000\nSensitivity = 4.1 mV/N\nForce [N]\n", "{v:g}", 8000.0),
+        ("fs: 8000\nCalibration: 2026-05-06\nForce [N]\n", "{v:g}", 8000.0),
+    ],
+)
+def test_sample_numbers_and_factors_of_a_header(
+    head: str, row: str, rate: float | None, tmp_path: Path
+) -> None:
+    rows = "".join(row.format(i=i, v=v) + "\n" for i, v in enumerate(half_sine(8000.0)))
+    (tmp_path / "t.csv").write_text(head + rows)
+    if rate is None:
+        with pytest.raises(InputError, match=naming("calibration")):
+            opened(tmp_path / "t.csv")
+        return
+    signal, force = read_all(tmp_path / "t.csv")
+    assert (signal.sample_rate, signal.notes) == (rate, ())
+    np.testing.assert_allclose(force, half_sine(8000.0), rtol=1e-5, atol=1e-2)
+
+
 def test_rate_of_header_and_times_must_agree(tmp_path: Path) -> None:
     rows = "".join(f"{i / 8000:.6f},{v:g}\n" for i, v in enumerate(half_sine(8000.0)))
     (tmp_path / "t.csv").write_text("fs: 4000\ntime_s,force_N\n" + rows)
@@ -359,7 +385,7 @@ def test_rate_of_group_and_times_must_agree(is_matrix: bool, tmp_path: Path) -> 
         if stated < 8080:
             assert read_all(tmp_path / "a.mat")[0].sample_rate == stated
             continue
-        with pytest.raises(InputError, match=naming("ball/F", "8100 Hz", "8000 Hz")):
+        with pytest.raises(InputError, match=naming("ball", "8100 Hz", "8000 Hz")):
             opened(tmp_path / "a.mat")
     # Times are nearer than the header of the file.
     scipy.io.savemat(tmp_path / "a.mat", {"ball": arrays, "Fs": 4000.0})
@@ -671,7 +697,7 @@ def test_lossy_sound_is_refused(kind: str, tmp_path: Path) -> None:
         ("".join(f"{i**2};1\n" for i in range(9)), naming("row", "1.2")),
         ("".join(f"{-i};1\n" for i in range(9)), naming("-1 s", "1000 s")),
         ("".join("0;1\n" for _ in range(9)), naming("0 s", "1000 s")),
-        ("".join(f"{i};1\n" for i in range(9)), naming("rate", "1 Hz")),
+        ("".join(f"{i};1\n" for i in range(9)), naming("rate", "sample_rate")),
         ("".join(f"{i / 8000},7\n" for i in range(9)), naming("samples", 7)),
         ("F_N\n" + "".join(f"{i}\n" for i in range(9)), naming("sample_rate")),
         ("x" * 100_000, naming("line 1", "65536 characters")),
@@ -1082,6 +1108,16 @@ def test_times_of_matlab_variables_are_found(variables: Callable[..., Any], tmp_
     signal, found = read_all(tmp_path / "ball.mat")
     assert signal.sample_rate == pytest.approx(8000)
     np.testing.assert_allclose(found, force, atol=1e-9)
+
+
+@pytest.mark.parametrize("is_matrix", [False, True])
+def test_times_with_a_gap_are_no_channel(is_matrix: bool, tmp_path: Path) -> None:  # noqa: FBT001
+    force = half_sine(8000.0)
+    time = np.arange(force.size) / 8000 + 0.1 * (np.arange(force.size) > 200)
+    arrays = {"F": np.column_stack([time, force])} if is_matrix else {"F": force, "t": time}
+    scipy.io.savemat(tmp_path / "a.mat", arrays)
+    with pytest.raises(InputError, match=naming("uniformly spaced")):
+        opened(tmp_path / "a.mat", unit="N")
 
 
 def test_several_times_of_one_length_show_no_rate(tmp_path: Path) -> None:

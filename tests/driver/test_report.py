@@ -30,10 +30,9 @@ from thud.level.estimate import Estimate
 from thud.level.levels import low_pass
 from thud.plot.recording_figures import recording_forces, recording_levels
 from thud.recordings.config import Config, read_config
-from thud.recordings.read_recording import read_recording
+from thud.recordings.instruments import Plate
 from thud.recordings.recorded_levels import measure_levels
-from thud.recordings.recording import Recording
-from thud.recordings.response import Plate
+from thud.recordings.recording import Recording, read_recording
 from thud.recordings.words import read_date
 from thud.report.contents import FIELDS, criteria_data, missing_fields, report_data
 from thud.report.notes import group_notes

@@ -13,7 +13,7 @@ from synthetic import coloured_noise, make_drop
 
 import thud
 from thud.recordings.config import read_config
-from thud.recordings.response import Chain, Plate
+from thud.recordings.instruments import Chain, Plate
 from thud.recordings.ringing import find_ringing
 from thud.recordings.signal import Signal
 

@@ -397,7 +397,7 @@ def test_workbook_is_read_like_a_table(tmp_path: Path, monkeypatch: pytest.Monke
     book.save(path)
     with pytest.raises(thud.InputError, match=naming("Pegel", "line 6", "60 dB")):
         thud.read_room_levels(path)
-    monkeypatch.setattr("thud.recordings.table.MAX_ROWS", 6)
+    monkeypatch.setattr("thud.recordings.formats.text.MAX_ROWS", 6)
     with pytest.raises(thud.InputError, match=naming("levels.xlsx", "Pegel", "6 rows")):
         thud.read_room_levels(path)
     path.write_bytes(b"PK no workbook")

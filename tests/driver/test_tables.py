@@ -14,14 +14,14 @@ from recording_files import opened
 
 import thud
 from thud.base.units import UNITS, find_unit
-from thud.recordings.table import read_table
+from thud.recordings.formats.text import read_table
 from thud.studies.fitting.force_record import time_and_force
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from thud.recordings.formats.text import Table
     from thud.recordings.signal import Signal
-    from thud.recordings.table import Table
 
 RATE = 8000.0
 ROWS = 40

@@ -17,7 +17,7 @@ from recording_files import WRITERS, half_sine
 
 from thud.base.errors import InputError
 from thud.recordings.config import Config
-from thud.recordings.signal_files import open_signals
+from thud.recordings.signal import open_signals
 
 if TYPE_CHECKING:
     import random

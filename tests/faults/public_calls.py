@@ -11,7 +11,7 @@ import numpy as np
 
 import thud
 from thud.comparison.comparison import read_all
-from thud.recordings.read_recording import read_recording
+from thud.recordings.recording import read_recording
 from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:

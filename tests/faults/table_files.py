@@ -23,7 +23,7 @@ from thud.floors.mobility_fit import fit_mobility
 from thud.floors.mobility_table import read_mobility
 from thud.floors.survey import rating_table, read_room_levels
 from thud.recordings.config import read_config
-from thud.recordings.table import read_table
+from thud.recordings.formats.text import read_table
 from thud.studies.compression_fit import fit_compression
 from thud.studies.fitting.force_record import read_record, time_and_force
 

@@ -18,7 +18,7 @@ from recorder_model import KINDS, Ball, Chain, Scene, drop_pulse, electric, plat
 
 from thud.base.errors import InputError
 from thud.recordings.config import config_from
-from thud.recordings.read_recording import read_recording
+from thud.recordings.recording import read_recording
 from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:

@@ -240,7 +240,7 @@ def run_export(options: argparse.Namespace) -> int:
 
 def _read_source(path: str, config: str | None) -> ImpactResult:
     """Return the recording in a file, or the impact of the case in it."""
-    from thud.recordings.read_recording import read_recording
+    from thud.recordings.recording import read_recording
 
     if kind_of(path) == "recording":
         return read_recording(path, config=config)

@@ -80,7 +80,7 @@ def _option(name: str) -> Argument:
 )  # fmt: skip
 def measure(options: argparse.Namespace) -> int:
     """Measure recordings, print the verdict and save results; return the exit code."""
-    from thud.recordings.read_recording import read_recording
+    from thud.recordings.recording import read_recording
     from thud.report import recording_files
     from thud.report.contents import missing_fields, report_data
     from thud.report.rows import drop_table, excluded_text

@@ -274,7 +274,7 @@ def read_all(paths: Iterable[str | os.PathLike[str]]) -> dict[str, Case | Impact
         If a file cannot be read, or two have the same name.
     """
     # SciPy is slow to import.
-    from thud.recordings.read_recording import read_recording
+    from thud.recordings.recording import read_recording
 
     items: dict[str, Case | ImpactResult] = {}
     for path in map(Path, paths):

@@ -19,7 +19,7 @@ from thud.explorer.answer import new_case
 from thud.explorer.models import MODEL_FACTS, facts_of
 from thud.explorer.recording import read_copies
 from thud.explorer.series import to_json
-from thud.recordings.table import read_table
+from thud.recordings.formats.text import read_table
 from thud.studies.compression_fit import fit_compression
 from thud.studies.fit import fit
 from thud.studies.fitting.force_target import ForceTarget
@@ -27,7 +27,7 @@ from thud.studies.fitting.force_target import ForceTarget
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from thud.recordings.table import Table
+    from thud.recordings.formats.text import Table
     from thud.studies.compression_fit import CompressionFit
     from thud.studies.fitting.fit_result import Fit
 
@@ -134,9 +134,12 @@ def _column(table: Table, unit: str) -> np.ndarray[Any, np.dtype[np.float64]]:
     """Return the numbers of the only column in a unit of the kind of `unit`, converted to it."""
     columns = [column for column in table.columns if size_of(column.unit)[0] == unit]
     if len(columns) != 1:
-        names = ", ".join(f"{column} ({column.unit or 'no unit'})" for column in table.columns)
+        names = ", ".join(
+            f"{column.name or column.number} ({column.unit or 'no unit'})"
+            for column in table.columns
+        )
         refuse(f"{table.name}: {len(columns)} columns in a unit of {unit} among {names}", EXPECTED)
     values = columns[0].to(unit)
     if not np.isfinite(values).all():
-        refuse(f"{table.name}: {columns[0]}: a value is not finite", "finite numbers")
+        refuse(f"{columns[0].label}: a value is not finite", "finite numbers")
     return values

@@ -16,8 +16,8 @@ from thud.explorer.recording_fields import TABLES
 from thud.impact.contact_time import contact_force
 from thud.recordings.config import config_from
 from thud.recordings.instruments import ASSUMED_SHARE
-from thud.recordings.read_recording import read_recording
-from thud.recordings.signal_files import open_signals
+from thud.recordings.recording import read_recording
+from thud.recordings.signal import open_signals
 from thud.report.contents import criteria_data, report_data
 from thud.report.page import report_page
 from thud.report.recording_files import draw_figures

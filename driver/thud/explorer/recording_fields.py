@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from thud.base.checks import require_choice
 from thud.case.keys import humanize
 from thud.recordings.config import Config
-from thud.recordings.response import Plate, RecorderFilter
+from thud.recordings.instruments import Plate, RecorderFilter
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping

@@ -14,8 +14,8 @@ from thud.base.errors import InputError
 from thud.base.units import size_of
 from thud.floors.mobility import Mobility
 from thud.recordings.formats import guarded
+from thud.recordings.formats.text import read_table
 from thud.recordings.formats.universal import FORCES, SAME_UNIT, DataSet, read_data_sets
-from thud.recordings.table import read_table
 
 if TYPE_CHECKING:
     import os

@@ -21,7 +21,7 @@ from thud.base.display import Tabulated
 from thud.base.note import Note
 from thud.level.levels import BANDWIDTHS
 from thud.level.rating import POSITIVE, Rating, rating, standardized_level
-from thud.recordings.table import read_table
+from thud.recordings.formats.text import read_table
 
 if TYPE_CHECKING:
     import os
@@ -241,7 +241,7 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
     kinds = [_kind(column.name) for column in table.columns]
     for column, kind in zip(table.columns, kinds, strict=True):
         if not kind or (kind == "mean" and "position" in kinds):
-            refuse(f"{path}: {column} is not a level of a position", ALLOWED)
+            refuse(f"{column.label} is not a level of a position", ALLOWED)
         if kind != "position" and kinds.count(kind) > 1:
             refuse(f"{path}: more than one column of {kind}", ALLOWED)
     columns = {

@@ -20,8 +20,7 @@ from thud.plot.style import (
 )
 from thud.recordings.contact import Contact
 from thud.recordings.drops import Section
-from thud.recordings.measured_drop import Drop
-from thud.recordings.read_recording import Stages
+from thud.recordings.measured_drop import Drop, Stages
 from thud.recordings.recorded_levels import DropLevels, measure_levels
 
 if TYPE_CHECKING:
@@ -66,7 +65,7 @@ def _panels(stage: Stage) -> list[tuple[Callable[[Axes, Any], None], Stage]]:
 
 def _draw_section(axes: Axes, section: Section) -> None:
     """Draw the force of a drop and of its bounces, and their contacts."""
-    for part in (*section.bounces, section):
+    for part in filter(None, (section.bounce, section)):
         time = (part.start + np.arange(len(part.force))) / part.sample_rate
         color = COLORS[0] if part is section else "0.55"
         axes.plot(time, 1e-3 * part.force, color=color, linewidth=0.8)

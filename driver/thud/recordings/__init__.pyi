@@ -16,13 +16,17 @@ from .drops import (
     cut_section as cut_section,
     find_drops as find_drops,
 )
-from .instruments import instrument_uncertainties as instrument_uncertainties
+from .instruments import (
+    Chain as Chain,
+    Plate as Plate,
+    RecorderFilter as RecorderFilter,
+    correct as correct,
+    instrument_uncertainties as instrument_uncertainties,
+)
 from .measured_drop import (
     Drop as Drop,
-    measure_drop as measure_drop,
-)
-from .read_recording import (
     Stages as Stages,
+    measure_drop as measure_drop,
     measure_stages as measure_stages,
 )
 from .recorded_levels import (
@@ -30,11 +34,7 @@ from .recorded_levels import (
     measure_levels as measure_levels,
 )
 from .repair import repair as repair
-from .response import (
-    Chain as Chain,
-    Plate as Plate,
-    RecorderFilter as RecorderFilter,
-    correct as correct,
+from .signal import (
+    Signal as Signal,
+    open_signals as open_signals,
 )
-from .signal import Signal as Signal
-from .signal_files import open_signals as open_signals

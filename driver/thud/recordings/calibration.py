@@ -16,8 +16,7 @@ from thud.base.units import find_unit
 from thud.recordings.config import Config
 from thud.recordings.force_units import ALLOWED, Calibration, require_unit
 from thud.recordings.formats import read_channels
-from thud.recordings.signal import Signal
-from thud.recordings.signal_files import channel_choices, choose_channels
+from thud.recordings.signal import Signal, channel_choices, choose_channels
 
 if TYPE_CHECKING:
     import os
@@ -166,7 +165,7 @@ def open_source(
         return record, "" if unit is None else require_unit(record.name, unit), ""
     path = regular_file(record)
     name = shown_text(path)
-    channels = choose_channels(read_channels(path), Config(channel=channel), name)
+    channels, _ = choose_channels(read_channels(path), Config(channel=channel), name)
     if len(channels) != 1:
         allowed = f"channel (--channel) = one of {channel_choices(channels)}"
         refuse(f"{name}: has {len(channels)} channels of force", allowed)

@@ -33,8 +33,7 @@ from thud.base.toml_tables import (
 )
 from thud.level.levels import SOURCES
 from thud.recordings.force_units import Calibration, require_unit
-from thud.recordings.response import Chain, Plate, RecorderFilter
-from thud.recordings.signal import POLARITIES
+from thud.recordings.instruments import Plate, RecorderFilter
 from thud.recordings.words import read_date
 
 if TYPE_CHECKING:
@@ -46,6 +45,9 @@ if TYPE_CHECKING:
 # A number of a drop, or the first and the last of several.
 NUMBERS = re.compile(r"\s*(\d{1,6})\s*(?:-\s*(\d{1,6})\s*)?")
 SUM = "sum"
+# How channels of forces are chosen, for messages.
+HINT = 'channels = "sum" for load cells under one plate, or channel = the force'
+POLARITIES = {"positive": 1.0, "negative": -1.0}
 # Maximum number of channels that are added, and of a channel; maximum N per unit.
 MAX_CELLS = 64
 MAX_CHANNEL = 1_000_000
@@ -286,21 +288,13 @@ class Config(TomlTable):
         return replace(self, **changes)
 
     @property
-    def resonance(self) -> Plate | None:
-        """The plate if its resonance is stated, which is corrected."""
-        return self.plate if self.plate and not math.isnan(self.plate.f0) else None
-
-    @property
-    def recorder_filter(self) -> RecorderFilter | None:
-        """The filter if it is stated and not flat, which is corrected."""
-        return self.filter if self.filter and self.filter.kind != "none" else None
-
-    @property
-    def chain(self) -> Chain | None:
-        """The instruments whose responses are corrected."""
-        stated = (self.resonance, self.recorder_filter)
-        instruments = tuple(instrument for instrument in stated if instrument is not None)
-        return Chain(instruments) if instruments else None
+    def corrected(self) -> tuple[Plate | None, RecorderFilter | None]:
+        """Plate and filter that are corrected: resonance or cutoff are stated; else None."""
+        plate, recorder = self.plate, self.filter
+        return (
+            plate if plate and not math.isnan(plate.f0) else None,
+            recorder if recorder and recorder.kind != "none" else None,
+        )
 
     def check_dates(self, file_dates: Iterable[str]) -> list[Note]:
         """Return a warning for each calibration that was due before the measurement.

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-    from thud.recordings.response import Chain
+    from thud.recordings.instruments import Chain
     from thud.recordings.signal import Signal
 
 # Pulses are searched in means over cells, each CELL seconds long; BLOCK cells are read at a time.
@@ -145,8 +145,7 @@ class Quantization:
 class Section(Stage):
     """Samples of a signal around one drop or bounce.
 
-    `thud.recordings.repair.repair` and `thud.recordings.response.correct` take a section and return
-    one.
+    `repair` and `correct` of `thud.recordings` take a section and return one.
 
     Attributes
     ----------
@@ -160,8 +159,8 @@ class Section(Stage):
         Index of the first sample in the signal.
     contact : tuple of int
         First and stop index of the contact in the section.
-    bounces : tuple of Section
-        Sections of the bounces after the drop.
+    bounce : Section or None
+        Section of the first bounce; None if there is none, or no background on both sides of it.
     cells : tuple of Section
         Sections of the load cells whose sum this is.
     full_scale : float or None
@@ -179,23 +178,17 @@ class Section(Stage):
     sample_rate: float
     start: int
     contact: tuple[int, int]
-    bounces: tuple[Section, ...] = ()
+    bounce: Section | None = None
     cells: tuple[Section, ...] = ()
     full_scale: float | None = None
     quantization: Quantization = field(default_factory=Quantization)
     chain: Chain | None = None
     notes: tuple[Note, ...] = ()
 
-    @property
+    @cached_property
     def offset(self) -> float:
         """Median of the force before and after the contact, N."""
         return float(np.median(np.delete(self.force, slice(*self.contact))))
-
-    @property
-    def has_background(self) -> bool:
-        """Whether 1 ms and four samples of background or more are on both sides of the contact."""
-        shortest = min(self.contact[0], len(self.force) - self.contact[1])
-        return shortest >= max(MIN_BACKGROUND * self.sample_rate, MIN_SAMPLES)
 
     @cached_property
     def roughness(self) -> NDArray[np.float64]:
@@ -243,7 +236,7 @@ def find_drops(
 
 
 def cut_section(signal: Signal, pulse: Pulse) -> Section:
-    """Return the samples around a drop and around its bounces."""
+    """Return the samples around a drop and around its first bounce."""
     first, stop = pulse.section
     contact = pulse.contact[0] - first, pulse.contact[1] - first
     rate = signal.sample_rate
@@ -252,12 +245,13 @@ def cut_section(signal: Signal, pulse: Pulse) -> Section:
         for cell in signal.cells
     )
     force = np.sum([cell.force for cell in cells], axis=0) if cells else signal.read(first, stop)
-    bounces = tuple(
-        cut_section(signal, replace(bounce, name=f"{pulse.name}, bounce {k}"))
-        for k, bounce in enumerate(pulse.bounces, start=1)
-    )
+    bounce = None
+    if pulse.bounces:
+        bounce = cut_section(signal, replace(pulse.bounces[0], name=f"{pulse.name}, bounce 1"))
+        length = min(bounce.contact[0], len(bounce.force) - bounce.contact[1])
+        bounce = bounce if length >= max(MIN_BACKGROUND * rate, MIN_SAMPLES) else None
     return Section(
-        pulse.name, force, rate, first, contact, bounces, cells, signal.full_scale,
+        pulse.name, force, rate, first, contact, bounce, cells, signal.full_scale,
         notes=pulse.notes,
     )  # fmt: skip
 

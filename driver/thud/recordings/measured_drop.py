@@ -1,6 +1,8 @@
-"""Contact time, restitution, peak, impulse and noise of a drop, with their uncertainties.
+"""One drop, stage by stage: contact time, restitution, peak, impulse and noise with uncertainties.
 
-Derivations: docs/recordings_theory.md.
+A drop has two restitutions (docs/recordings_theory.md, 5). That by the impulse needs the mass and a
+calibrated force, but no bounce in the record; that by the bounces needs neither. Where both are
+known, their difference shows a wrong mass, height or calibration.
 """
 
 from __future__ import annotations
@@ -13,25 +15,26 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.signal import resample
 
+from thud.base._schema import Drop as DropKeys
 from thud.base.checks import refuse
 from thud.base.note import Note
-from thud.level.estimate import RECTANGULAR, Estimate
+from thud.level.estimate import RECTANGULAR, UNKNOWN, Contribution, Estimate
 from thud.level.levels import RECORDED_BAND, low_pass
 from thud.recordings.background import remove_background
-from thud.recordings.checks import CONTACT_CHECKS
-from thud.recordings.contact import SAMPLE_ERROR, Contact, find_edge
-from thud.recordings.drops import Stage, robust_deviation
-from thud.recordings.instruments import peak_uncertainty
-from thud.recordings.quantities import BOUNCES, GRAVITY, IMPULSE, MASS, RESTITUTION, measure_rebound
+from thud.recordings.contact import SAMPLE_ERROR, Contact, find_contact, find_edge
+from thud.recordings.drops import Section, Stage, robust_deviation
+from thud.recordings.instruments import correct, peak_uncertainty
 from thud.recordings.recorded_levels import measure_levels
+from thud.recordings.repair import check_aliasing, repair
 from thud.recordings.ringing import find_ringing, is_in_record
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
     from thud.base._schema import BandSet
     from thud.recordings.config import Config
-    from thud.recordings.drops import Section
     from thud.recordings.ringing import Ringing
 
 # Minimum rate of the force in which the peak is searched, Hz, and length of zeros on either side of
@@ -46,11 +49,18 @@ MIN_CONTACT_RATIO = 4.0
 # Maximum factor between the restitution by flight and the ratio of the peaks. Beyond it a pulse is
 # no bounce, because the force follows the velocity.
 MAX_BOUNCE_RATIO = 3.0
-# Cutoff of a filter over the equivalent bandwidth of its noise: 0.89 of a mean, 0.96 of a Bessel
-# filter of order 4. White noise up to half the rate has more than a quarter of the rate.
-CUTOFF_RATIO = 0.9
 # Quantities of `QUANTITIES` that are estimated for each drop.
 ESTIMATES = ("contact_time", "restitution", "peak_force", "impulse", "effective_mass")
+# Gravity, m/s2, the default of the models.
+GRAVITY = DropKeys.gravity
+IMPULSE, BOUNCES, RESTITUTION, MASS = "impulse", "bounces", "restitution", "effective_mass"
+# Restitution by the impulse minus that by the bounces.
+DIFFERENCE = "difference"
+# Maximum error of the measured release, s, and maximum height by which the center of a ball is
+# lower or higher at the release than at first touch, m: finite elements, modal ball and shell have
+# up to 0.5 ms, and -2 to 4 mm.
+SLOW_RELEASE = 5e-4
+DEFORMATION = 4e-3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -130,17 +140,53 @@ class Drop(Stage):
         force = np.delete(self.force, slice(*self.gate))
         return robust_deviation(force - np.median(force)) if force.size else math.nan
 
-    @property
-    def effective_rate(self) -> float:
-        """Sample rate, Hz, or the lower one that the noise of the background would have."""
-        return min(self.contact.sample_rate, 4 * CUTOFF_RATIO * self.contact.noise_bandwidth)
-
     def levels(self, bands: BandSet = "octave") -> NDArray[np.float64]:
         """Return the force exposure levels, corrected for the background, dB, shape (n_band,).
 
         Their uncertainties are in `thud.recordings.recorded_levels.measure_levels`.
         """
         return np.array(measure_levels([self], bands).level[0])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Stages(Stage):
+    """One drop after each stage of its measurement.
+
+    Attributes
+    ----------
+    section : Section
+        As recorded.
+    repaired : Section
+        With spikes filled.
+    corrected : Section
+        After the correction of the instruments.
+    drop : Drop
+        Without background, measured.
+    """
+
+    section: Section
+    repaired: Section
+    corrected: Section
+    drop: Drop
+
+
+def measure_stages(section: Section, config: Config, calibration: float | None = None) -> Stages:
+    """Measure the drop in a section; `calibration` is the relative uncertainty of the force.
+
+    The levels of drops are `thud.recordings.recorded_levels.measure_levels`, their budget is
+    `Recording.level_estimates`. Raise InputError if the drop cannot be measured.
+    """
+    repaired = repair(section)
+    corrected = correct(repaired, *config.corrected)
+    try:
+        contact = find_contact(corrected, *remove_background(corrected))
+    except np.linalg.LinAlgError as error:
+        allowed = "a background of noise, drift and hum"
+        refuse(f"{section.name}: the background is not noise", allowed, error)
+    drop = measure_drop(corrected, contact, config, calibration, repaired)
+    # A copy without the cached factors of the background, which are no longer needed.
+    contact = replace(contact, background=replace(contact.background))
+    return Stages(section, repaired, corrected, replace(drop, contact=contact))
 
 
 def measure_drop(
@@ -152,7 +198,7 @@ def measure_drop(
 ) -> Drop:
     """Return contact time, peak, impulse, restitution and effective mass of a drop.
 
-    `section` is that of the contact, with its bounces, and `recorded` the same before the
+    `section` is that of the contact, with its bounce, and `recorded` the same before the
     correction of the instruments, which shows whether the resonance of a stated plate is in it.
     `calibration` is the relative standard uncertainty of the force. Raise InputError if the contact
     cannot be distinguished from the noise.
@@ -181,9 +227,9 @@ def measure_drop(
     impulse = Estimate(float((ones @ contact.gated)[0]), math.sqrt(variance))
     peak_force = _peak(contact)
     landing = _first_landing(section, contact)
-    if landing and config.height:
+    if landing and section.bounce and config.height:
         # The force of a bounce follows its velocity, and so does the flight before it.
-        flight, bounce = landing - contact.release, section.bounces[0]
+        flight, bounce = landing - contact.release, section.bounce
         ratio = float(bounce.force[slice(*bounce.contact)].max()) - bounce.offset
         ratio /= contact.background.peak
         expected = GRAVITY * flight.value / (2 * math.sqrt(2 * GRAVITY * config.height))
@@ -195,8 +241,8 @@ def measure_drop(
         impulse, contact.release - contact.touch, landing - contact.release if landing else None,
         config, calibration, contact.background.quantization.offset * contact_time.value,
     )  # fmt: skip
-    notes += (note for check in CONTACT_CHECKS for note in check(section, contact))
-    ringing, plate = find_ringing(contact, section.chain), config.resonance
+    notes += check_aliasing(section, contact)
+    ringing, plate = find_ringing(contact, section.chain), config.corrected[0]
     if ringing:
         code = "plate_rings_differently" if section.chain else "plate_rings"
         others = {"frequency": ringing.frequency, "quality": ringing.quality}
@@ -227,9 +273,9 @@ def measure_drop(
 
 def _first_landing(section: Section, contact: Contact) -> Estimate | None:
     """Return the first touch of the first bounce, in the time of a contact, s; None if unknown."""
-    if not section.bounces or not section.bounces[0].has_background:
+    bounce = section.bounce
+    if bounce is None:
         return None
-    bounce = section.bounces[0]
     force, background = remove_background(bounce, contact.background)
     touch = find_edge(bounce, force, background, side=1)[0]
     delay = (bounce.start - section.start - contact.start) / section.sample_rate
@@ -255,3 +301,97 @@ def _peak(contact: Contact) -> Estimate:
     # The top stays within a step for some time: its error is that of the offset again.
     variance += contact.covariance[cell, cell] + 2 * contact.background.quantization.offset**2
     return Estimate(float(low.max()) - noise, math.sqrt(variance))
+
+
+def shared_causes(config: Config, calibration: float | None) -> dict[str, Contribution]:
+    """Return what is uncertain in all drops alike, in its own unit, by name.
+
+    `calibration` is the relative standard uncertainty of the force. One that is not stated is zero.
+    """
+    causes = (
+        ("calibration", calibration or 0.0, "", 1.0),
+        ("mass", config.mass_uncertainty or 0.0, "kg", 1.0),
+        ("drop height", config.height_uncertainty or 0.0, "m", 1.0),
+        ("slow release", SLOW_RELEASE, "s", RECTANGULAR),
+        ("deformed ball", DEFORMATION, "m", RECTANGULAR),
+    )
+    return {
+        name: Contribution(name, size / divisor, size=size, unit=unit, divisor=divisor)
+        for name, size, unit, divisor in causes
+    }
+
+
+def measure_rebound(  # noqa: PLR0913, PLR0917 - what is measured, and what is stated
+    impulse: Estimate,
+    duration: Estimate,
+    flight: Estimate | None,
+    config: Config,
+    calibration: float | None = None,
+    quantization: float = 0.0,
+) -> tuple[dict[str, Estimate], dict[str, dict[str, float]]]:
+    """Return how a ball returns after a contact; NaN if mass, height or flight do not allow it.
+
+    These are the restitution by `IMPULSE` and by `BOUNCES`, their mean `RESTITUTION`, weighted by
+    inverse variances, their `DIFFERENCE`, and the effective `MASS`, kg. Their uncertainties are
+    those by the noise of the drop; also returned are the changes of each by one standard
+    uncertainty of what all drops share (`shared_causes`, and quantization).
+
+    The impulse is in N s; the duration of the contact, and the flight, s, are those between first
+    touch and release. `quantization` is the standard uncertainty of the impulse by quantization of
+    the background, N s. Uncertainties are propagated linearly (JCGM 100, 5.1.2), with slopes by
+    central differences.
+    """
+    noise = {"impulse": impulse, "duration": duration, "flight": flight or UNKNOWN}
+    steps = {name: c.uncertainty for name, c in shared_causes(config, calibration).items()}
+    steps["quantization"] = quantization
+    steps |= {name: estimate.uncertainty for name, estimate in noise.items()}
+    inputs = dict.fromkeys(steps, 0.0) | {name: e.value for name, e in noise.items()}
+    inputs |= {"mass": config.mass or math.nan, "drop height": config.height or math.nan}
+    values = _rebound(inputs)
+    effects: dict[str, dict[str, float]] = {name: {} for name in values}
+    for cause, step in steps.items():
+        low, high = (
+            _rebound({**inputs, cause: inputs[cause] + half}) for half in (-step / 2, step / 2)
+        )
+        for name in values:
+            effects[name][cause] = high[name] - low[name]
+    methods = [method for method in (IMPULSE, BOUNCES) if math.isfinite(values[method])]
+    weights = np.array([1 / max(math.hypot(*effects[m].values()), 1e-12) ** 2 for m in methods])
+    for name, factors, used in (
+        (RESTITUTION, weights / weights.sum(), methods),
+        (DIFFERENCE, np.array([1, -1]), [IMPULSE, BOUNCES]),
+    ):
+        values[name] = float(factors @ [values[method] for method in used]) if methods else math.nan
+        effects[name] = {
+            cause: float(factors @ [effects[method][cause] for method in used]) for cause in steps
+        }
+    estimates = {
+        name: Estimate(value, math.hypot(*(effects[name][cause] for cause in noise)))
+        for name, value in values.items()
+    }
+    shared = {
+        name: {cause: effect for cause, effect in row.items() if effect and cause not in noise}
+        for name, row in effects.items()
+        if math.isfinite(values[name])
+    }
+    return estimates, shared
+
+
+def _rebound(values: Mapping[str, float]) -> dict[str, float]:
+    """Return the restitution by impulse and by bounces, and the effective mass.
+
+    By the impulse it is (J - m g t)/(m v) - 1, where a slow release makes the measured duration t
+    too long; by bounces e = g T/(2 v), where a flight from a height d lasts 2 e v/g + d/(e v). The
+    mass is J/(v + g T/2 + g t).
+    """
+    # A stated uncertainty may exceed its value.
+    height, mass = (max(values[name], 1e-6) for name in ("drop height", "mass"))
+    speed = math.sqrt(2 * GRAVITY * height)
+    momentum = values["impulse"] * (1 + values["calibration"]) + values["quantization"]
+    duration = values["duration"] - values["slow release"]
+    rise = GRAVITY * values["flight"] / 2
+    return {
+        IMPULSE: momentum / mass / speed - 1 - GRAVITY * duration / speed,
+        BOUNCES: (rise + GRAVITY * values["deformed ball"] / (2 * rise)) / speed,
+        MASS: momentum / (speed + rise + GRAVITY * values["duration"]),
+    }

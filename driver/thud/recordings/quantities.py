@@ -1,9 +1,4 @@
-"""Quantities of a recording besides its levels: of each drop, and their means with budgets.
-
-A drop has two restitutions (docs/recordings_theory.md, 5). That by the impulse needs the mass and a
-calibrated force, but no bounce in the record; that by the bounces needs neither. Where both are
-known, their difference shows a wrong mass, height or calibration.
-"""
+"""Quantities of a recording besides its levels: means over the drops, with their budgets."""
 
 from __future__ import annotations
 
@@ -13,10 +8,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thud.base._schema import Drop as DropKeys
 from thud.base.note import Note
 from thud.level.estimate import RECTANGULAR, UNKNOWN, Contribution, Estimate
 from thud.level.levels import RECORDED_BAND, peak_count
+from thud.recordings.measured_drop import (
+    BOUNCES,
+    DIFFERENCE,
+    IMPULSE,
+    MASS,
+    RESTITUTION,
+    shared_causes,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -24,116 +26,12 @@ if TYPE_CHECKING:
     from thud.recordings.config import Config
     from thud.recordings.measured_drop import Drop
 
-# Gravity, m/s2, the default of the models.
-GRAVITY = DropKeys.gravity
-IMPULSE, BOUNCES, RESTITUTION, MASS = "impulse", "bounces", "restitution", "effective_mass"
-# Restitution by the impulse minus that by the bounces.
-DIFFERENCE = "difference"
-# Maximum error of the measured release, s, and maximum height by which the center of a ball is
-# lower or higher at the release than at first touch, m: finite elements, modal ball and shell have
-# up to 0.5 ms, and -2 to 4 mm.
-SLOW_RELEASE = 5e-4
-DEFORMATION = 4e-3
 # Contribution of restitutions that differ by more than their uncertainties.
 DISAGREEMENT = "impulse against bounces"
 # Prominence of a counted peak as a fraction of the peak force, and the minimum of this prominence
 # in standard deviations of the noise.
 PROMINENCE = 0.1
 MIN_PROMINENCE = 6.0
-
-
-def shared_causes(config: Config, calibration: float | None) -> dict[str, Contribution]:
-    """Return what is uncertain in all drops alike, in its own unit, by name.
-
-    `calibration` is the relative standard uncertainty of the force. One that is not stated is zero.
-    """
-    causes = (
-        ("calibration", calibration or 0.0, "", 1.0),
-        ("mass", config.mass_uncertainty or 0.0, "kg", 1.0),
-        ("drop height", config.height_uncertainty or 0.0, "m", 1.0),
-        ("slow release", SLOW_RELEASE, "s", RECTANGULAR),
-        ("deformed ball", DEFORMATION, "m", RECTANGULAR),
-    )
-    return {
-        name: Contribution(name, size / divisor, size=size, unit=unit, divisor=divisor)
-        for name, size, unit, divisor in causes
-    }
-
-
-def measure_rebound(  # noqa: PLR0913, PLR0917 - what is measured, and what is stated
-    impulse: Estimate,
-    duration: Estimate,
-    flight: Estimate | None,
-    config: Config,
-    calibration: float | None = None,
-    quantization: float = 0.0,
-) -> tuple[dict[str, Estimate], dict[str, dict[str, float]]]:
-    """Return how a ball returns after a contact; NaN if mass, height or flight do not allow it.
-
-    These are the restitution by `IMPULSE` and by `BOUNCES`, their mean `RESTITUTION`, weighted by
-    inverse variances, their `DIFFERENCE`, and the effective `MASS`, kg. Their uncertainties are
-    those by the noise of the drop; also returned are the changes of each by one standard
-    uncertainty of what all drops share (`shared_causes`, and quantization).
-
-    The impulse is in N s; the duration of the contact, and the flight, s, are those between first
-    touch and release. `quantization` is the standard uncertainty of the impulse by quantization of
-    the background, N s. Uncertainties are propagated linearly (JCGM 100, 5.1.2), with slopes by
-    central differences.
-    """
-    noise = {"impulse": impulse, "duration": duration, "flight": flight or UNKNOWN}
-    steps = {name: c.uncertainty for name, c in shared_causes(config, calibration).items()}
-    steps["quantization"] = quantization
-    steps |= {name: estimate.uncertainty for name, estimate in noise.items()}
-    inputs = dict.fromkeys(steps, 0.0) | {name: e.value for name, e in noise.items()}
-    inputs |= {"mass": config.mass or math.nan, "drop height": config.height or math.nan}
-    values = _rebound(inputs)
-    effects: dict[str, dict[str, float]] = {name: {} for name in values}
-    for cause, step in steps.items():
-        low, high = (
-            _rebound({**inputs, cause: inputs[cause] + half}) for half in (-step / 2, step / 2)
-        )
-        for name in values:
-            effects[name][cause] = high[name] - low[name]
-    methods = [method for method in (IMPULSE, BOUNCES) if math.isfinite(values[method])]
-    weights = np.array([1 / max(math.hypot(*effects[m].values()), 1e-12) ** 2 for m in methods])
-    for name, factors, used in (
-        (RESTITUTION, weights / weights.sum(), methods),
-        (DIFFERENCE, np.array([1, -1]), [IMPULSE, BOUNCES]),
-    ):
-        values[name] = float(factors @ [values[method] for method in used]) if methods else math.nan
-        effects[name] = {
-            cause: float(factors @ [effects[method][cause] for method in used]) for cause in steps
-        }
-    estimates = {
-        name: Estimate(value, math.hypot(*(effects[name][cause] for cause in noise)))
-        for name, value in values.items()
-    }
-    shared = {
-        name: {cause: effect for cause, effect in row.items() if effect and cause not in noise}
-        for name, row in effects.items()
-        if math.isfinite(values[name])
-    }
-    return estimates, shared
-
-
-def _rebound(values: Mapping[str, float]) -> dict[str, float]:
-    """Return the restitution by impulse and by bounces, and the effective mass.
-
-    By the impulse it is (J - m g t)/(m v) - 1, where a slow release makes the measured duration t
-    too long; by bounces e = g T/(2 v), where a flight from a height d lasts 2 e v/g + d/(e v). The
-    mass is J/(v + g T/2 + g t).
-    """
-    # A stated uncertainty may exceed its value.
-    height, mass = (max(values[name], 1e-6) for name in ("drop height", "mass"))
-    speed = math.sqrt(2 * GRAVITY * height)
-    momentum = values["impulse"] * (1 + values["calibration"]) + values["quantization"]
-    duration = values["duration"] - values["slow release"]
-    rise = GRAVITY * values["flight"] / 2
-    return {
-        IMPULSE: momentum / mass / speed - 1 - GRAVITY * duration / speed,
-        BOUNCES: (rise + GRAVITY * values["deformed ball"] / (2 * rise)) / speed,
-        MASS: momentum / (speed + rise + GRAVITY * values["duration"]),
-    }
 
 
 def drop_estimates(

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from thud.recordings.contact import Contact
     from thud.recordings.drops import Section
-    from thud.recordings.response import Chain, Plate
+    from thud.recordings.instruments import Chain, Plate
 
 # Minimum frequency of a resonance of a plate, Hz, maximum as a fraction of the sample rate, and
 # trial decay times to 1/e, s.

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Sequence
 
-    from thud.recordings.read_recording import Stages
+    from thud.recordings.measured_drop import Stages
 
 # Columns of the page that the printed table has.
 _SHOWN = ("Criterion", "Value", "U (95 %)", "Limits", "Margin", "Verdict")

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thud.base.checks import refuse
+from thud.recordings.config import HINT
 from thud.recordings.drops import FROM_CUBIC
-from thud.recordings.signal import HINT
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -12,7 +12,7 @@ from thud.level.estimate import NORMAL_FACTOR
 from thud.recordings.instruments import FLAT, TOLERANCE
 
 if TYPE_CHECKING:
-    from thud.recordings.response import Plate
+    from thud.recordings.instruments import Plate
 
 # Maximum force that a plate must measure, N.
 RANGE = 5000.0

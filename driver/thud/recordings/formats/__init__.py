@@ -16,7 +16,6 @@ import numpy as np
 from thud.base.checks import refuse, shown_text
 from thud.base.errors import InputError
 from thud.base.note import Note
-from thud.base.units import size_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -83,11 +82,6 @@ class Channel:
     notes: tuple[Note, ...] = ()
     may_be_fractions: bool = False
     unapplied: str = ""
-
-    @property
-    def is_force(self) -> bool:
-        """Whether its values are in a unit of force."""
-        return size_of(self.unit)[0] == "N"
 
     @property
     def title(self) -> str:
@@ -173,18 +167,19 @@ def guarded(path: Path, kind: str) -> Iterator[None]:
         )
 
 
-def rise_uniformly(values: NDArray[np.float64]) -> bool:
-    """Whether values may be times: steps are positive, and differ by a factor of 2 at most."""
-    with np.errstate(invalid="ignore"):  # infinite numbers
-        rise = np.diff(values)
-    return bool((rise > 0).all() and rise.max() <= 2.01 * rise.min())
+def rises(values: NDArray[np.float64]) -> bool:
+    """Whether values may be times: each is larger than the one before it."""
+    return bool((values[1:] > values[:-1]).all())
 
 
-def uniform_grid(time: NDArray[np.float64], name: str) -> tuple[float, float, tuple[Note, ...]]:
-    """Return start and step, s, of the uniform grid that fits times best, and notes.
+def uniform_grid(
+    time: NDArray[np.float64], name: str, stated: float | None = None
+) -> tuple[float, float, float, tuple[Note, ...]]:
+    """Return start and step, s, of the uniform grid that fits times best, its rate, Hz, and notes.
 
     Times, s, shape (n_sample,), may be rounded to a quarter of the step: at 44.1 kHz, the fifth
-    decimal is half a step. Raise InputError if a time is off the grid, or the step is not allowed.
+    decimal is half a step. A stated rate replaces that of the times. Raise InputError if a time is
+    off the grid, the step is not allowed, or the rates differ.
     """
     if not np.isfinite(time).all():
         refuse(f"{name}: a time is not finite", "real numbers, s")
@@ -205,19 +200,13 @@ def uniform_grid(time: NDArray[np.float64], name: str) -> tuple[float, float, tu
             f"{deviation[worst]:.2g} steps of {step:.4g} s off a uniform grid",
             f"a constant step, within {TOLERANCE:g} steps",
         )
-    begin = float(time.mean() + index[0] * step)
-    if deviation[worst] <= NOTED:
-        return begin, step, ()
-    size = float(deviation[worst]) * step
-    others = {"rate": 1 / step}
-    return begin, step, (Note("times_rounded", name, 1e6 * size, unit="µs", others=others),)
-
-
-def agreed_rate(stated: float | None, of_times: float, name: str) -> float:
-    """Return the sample rate, Hz, of a header, or that of times without one; refuse two."""
-    if stated is not None and abs(stated / of_times - 1) > SAME_RATE:
+    if stated is not None and abs(stated * step - 1) > SAME_RATE:
         refuse(
-            f"{name}: {stated:.6g} Hz by its header and {of_times:.6g} Hz by its times",
+            f"{name}: {stated:.6g} Hz by its header and {1 / step:.6g} Hz by its times",
             "one sample rate; times are in s if no unit is stated",
         )
-    return stated or of_times
+    notes: tuple[Note, ...] = ()
+    if deviation[worst] > NOTED:
+        size, others = float(deviation[worst]) * step, {"rate": 1 / step}
+        notes = (Note("times_rounded", name, 1e6 * size, unit="µs", others=others),)
+    return float(time.mean() + index[0] * step), step, stated or 1 / step, notes

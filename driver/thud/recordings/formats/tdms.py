@@ -11,7 +11,7 @@ import numpy as np
 from thud.base.checks import refuse, shown_text
 from thud.base.extras import library
 from thud.recordings.formats import Channel, guarded
-from thud.recordings.words import DATE, UNIT, find_rate, find_unapplied, find_word, text_of
+from thud.recordings.words import read_facts, text_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -83,8 +83,8 @@ def _channel(path: Path, number: int, owners: tuple[Any, Any, Any]) -> Channel:
             f"{shown_text(path)}: npTDMS does not apply the scale {shown_text(min(unknown))!r}",
             f"a table of the scaled values, or scales of {', '.join(sorted(SCALES))}",
         )
-    unit, samples = find_word(items, UNIT), partial(_read, path, group.name, channel.name)
+    facts, samples = read_facts(items), partial(_read, path, group.name, channel.name)
     return Channel(
-        channel.name, number, len(channel), samples, unit, find_rate(items),
-        date=find_word(items, DATE), unapplied=find_unapplied(items, unit),
+        channel.name, number, len(channel), samples, facts.unit, facts.rate,
+        date=facts.date, unapplied=facts.unapplied,
     )  # fmt: skip

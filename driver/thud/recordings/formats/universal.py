@@ -96,9 +96,10 @@ def _channel(path: Path, number: int, data_set: DataSet) -> Channel:
     notes: tuple[Note, ...] = ()
     if record["abscissa_spacing"] == 1:
         step = record["abscissa_inc"] * scale
+        rate = 1 / step if step > 0 else None
     else:
         times = np.asarray(record["x"], dtype=np.float64)[:expected] * scale
-        _, step, notes = uniform_grid(times, name)
+        *_, rate, notes = uniform_grid(times, name)
     unit, newtons, note = _ordinate(data_set)
     return Channel(
         name=data_set.label("ordinate_axis_lab") or record["id1"].strip(),
@@ -106,7 +107,7 @@ def _channel(path: Path, number: int, data_set: DataSet) -> Channel:
         n_sample=expected,
         samples=freeze(data[:expected] * newtons),
         unit=unit,
-        sample_rate=1 / step if step > 0 else None,
+        sample_rate=rate,
         date=data_set.label("id3"),
         notes=notes + note,
     )

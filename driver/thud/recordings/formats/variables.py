@@ -12,15 +12,11 @@ import numpy as np
 from thud.base.checks import refuse
 from thud.base.files import MAX_IN_MEMORY
 from thud.base.units import factor_to, find_unit
-from thud.recordings.formats import MIN_SAMPLES, Channel, agreed_rate, rise_uniformly, uniform_grid
+from thud.recordings.formats import MIN_SAMPLES, Channel, rises, uniform_grid
 from thud.recordings.words import (
-    DATE,
     TIME,
-    UNIT,
-    find_rate,
-    find_unapplied,
-    find_word,
     is_time,
+    read_facts,
     split_title,
     text_of,
 )
@@ -123,7 +119,7 @@ def _channel(
 ) -> Channel:
     own, near, entries = _header_of(vector, header)
     notes: tuple[Note, ...] = ()
-    rate = find_rate(near)
+    rate = read_facts(near).rate
     # Times override a rate in the header of an outer group, and must fit that of array and group if
     # they are in the same group; of several it is not known which apply.
     own_key, count = f"{vector.array}/", vector.n_sample
@@ -131,16 +127,16 @@ def _channel(
     depth = max((len(time.group) for time in fitting), default=0)
     inner = [time for time in fitting if len(time.group) == depth]
     if len(inner) == 1 and (rate is None or depth > vector.array.rfind("/")):
-        of_times, notes = _rate(inner[0], header, name)
-        rate = agreed_rate(rate, of_times, f"{name}: {vector.array}") if of_times else rate
-    stated, titled = find_word(own, UNIT), split_title(vector.title)[1]
-    unit = stated or titled or find_word(entries, UNIT)
+        rate, notes = _rate(inner[0], header, name, rate)
+    stated, titled = read_facts(own).unit, split_title(vector.title)[1]
+    facts = read_facts(entries, stated or titled)
+    unit = facts.unit
     if len({find_unit(stated), find_unit(titled)} - {""}) > 1:
         unit = f"{stated} by the attribute, {titled} by the name"
     title = vector.array + (f"[{vector.column}]" if vector.column else "")
     return Channel(
-        title, number, count, vector.read, unit, rate or find_rate(entries),
-        date=find_word(entries, DATE), notes=notes, unapplied=find_unapplied(entries, unit),
+        title, number, count, vector.read, unit, rate or facts.rate,
+        date=facts.date, notes=notes, unapplied=facts.unapplied,
     )  # fmt: skip
 
 
@@ -169,20 +165,22 @@ def _holds_times(vector: Vector) -> bool:
     name, unit = split_title(vector.title)
     is_named = is_time(name, unit) or vector.title.rpartition("_")[2].casefold() in TIME
     may_be = vector.column == 1 if vector.column else is_named
-    return may_be and rise_uniformly(vector.read(0, min(MAX_TIMES, vector.n_sample)))
+    return may_be and rises(vector.read(0, min(MAX_TIMES, vector.n_sample)))
 
 
-def _rate(time: Vector, header: Header, name: str) -> tuple[float | None, tuple[Note, ...]]:
+def _rate(
+    time: Vector, header: Header, name: str, stated: float | None
+) -> tuple[float | None, tuple[Note, ...]]:
     """Return the sample rate, Hz, and notes, from the first times of a vector.
 
-    The rate is None if it is not known whether the times were multiplied by a factor.
+    It is the stated one if it is not known whether the times were multiplied by a factor.
     """
     label, own, scale = f"{name}: {time.array}", _header_of(time, header)[0], 1.0
     if not time.column:
-        if find_unapplied(own, "s"):
-            return None, ()
+        if read_facts(own, "s").unapplied:
+            return stated, ()
         # NetCDF: "seconds since 2024-05-06".
-        unit = find_word(own, UNIT).partition(" since ")[0] or split_title(time.title)[1]
+        unit = read_facts(own).unit.partition(" since ")[0] or split_title(time.title)[1]
         scale = factor_to("s", unit, label)
-    _, step, notes = uniform_grid(time.read(0, min(MAX_TIMES, time.n_sample)) * scale, label)
-    return 1 / step, notes
+    times = time.read(0, min(MAX_TIMES, time.n_sample)) * scale
+    return uniform_grid(times, label, stated)[2:]

@@ -10,7 +10,7 @@ from thud.base.checks import refuse
 from thud.recordings.formats import MIN_SAMPLES, uniform_grid
 
 if TYPE_CHECKING:
-    from thud.recordings.table import Table
+    from thud.recordings.formats.text import Table
     from thud.studies.arrays import Array
 
 # Maximum force, N: its square is finite.
@@ -51,7 +51,7 @@ def read_record(table: Array, name: str = "record") -> Record:
     if not np.isfinite(table).all():
         refuse(f"{name}: a value is not finite", "real numbers")
     time, force = table.T
-    begin, step, _ = uniform_grid(time, name)
+    begin, step, *_ = uniform_grid(time, name)
     if force.max() <= 0 and not force.min() < 0:
         refuse(f"{name}: the force is nowhere positive", "the force on the floor, N")
     if -force.min() > force.max():

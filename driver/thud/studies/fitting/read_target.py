@@ -9,8 +9,8 @@ from thud.base._schema import QUANTITIES, SAMPLE_QUANTITIES
 from thud.base.checks import refuse, refuse_unknown, refuse_value, require_number
 from thud.base.units import power_of, scaled
 from thud.recordings.formats import FORMATS
-from thud.recordings.read_recording import read_recording
-from thud.recordings.table import read_table
+from thud.recordings.formats.text import read_table
+from thud.recordings.recording import read_recording
 from thud.studies.fitting.force_record import read_record, time_and_force
 from thud.studies.fitting.force_target import ForceTarget
 from thud.studies.fitting.level_target import LevelTarget
