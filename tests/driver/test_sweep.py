@@ -10,6 +10,7 @@ import shutil
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import pandas
 import pytest
 import scipy
 import xarray as xr
@@ -598,6 +599,14 @@ def test_values_by_names_of_keys_are_a_grid() -> None:
     assert found.dataset.drop_attrs().identical(thud.sweep(table).dataset.drop_attrs())
     frame = found.to_dataframe()
     assert frame.loc[0.5, 2.6]["floor_octave_63"] == found.dataset["floor_octave"].values[0, 1, 1]
+    # Scalars, ranges and columns are arrays, as for `solve_many`.
+    frame = pandas.DataFrame({"height": [0.5, 1.0]})
+    values = {"height": frame["height"], "substeps": range(2, 4), "mass": 2.4}
+    assert dict(thud.sweep(values).dataset.sizes) == {
+        "height": 2, "substeps": 2, "mass": 1, "octave": 5,
+    }  # fmt: skip
+    with pytest.raises(thud.InputError, match=naming("mass", "dimension")):
+        thud.sweep({"mass": [[2.4, 2.6]]})
     with pytest.raises(thud.InputError, match=naming("'hight'", "'height'")):
         thud.sweep({"hight": [1.0]})
     with pytest.raises(thud.InputError, match=naming("case")):

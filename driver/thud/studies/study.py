@@ -19,6 +19,7 @@ from thud.base.checks import (
     refuse,
     refuse_unknown,
     refuse_value,
+    require_array,
     require_choice,
     require_kind,
     shown,
@@ -228,7 +229,9 @@ def read_tables(
     if isinstance(source, Mapping):
         if source and not {*source} & {*COMMON_KEYS, *_SAMPLE_KEYS, "target"}:
             entries = {
-                name: entry if isinstance(entry, Mapping | Parameter) else {"values": entry}
+                name: entry
+                if isinstance(entry, Mapping | Parameter)
+                else {"values": np.atleast_1d(require_array(name, entry, (0, 1)))}
                 for name, entry in source.items()
             }
             source = {"parameters": entries}
