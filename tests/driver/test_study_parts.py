@@ -128,7 +128,7 @@ def test_grids_and_lists_need_values_that_fit() -> None:
         sampling.read_design({"kind": "list"}, ("list",), (two, three))
     with pytest.raises(thud.InputError, match=naming("count", "random")):
         sampling.read_design({"size": 4}, ("random",), (two,))
-    largest = (replace(two, count=2**15), replace(two, count=2**15))
+    largest = (replace(two, count=2**12), replace(two, count=2**12))
     assert sampling.read_design({}, ("grid",), largest) == {"design": "grid"}
     with pytest.raises(thud.InputError, match=naming("grid", MAX_VALUES)):
         sampling.read_design({}, ("grid",), (*largest, three))
@@ -136,7 +136,7 @@ def test_grids_and_lists_need_values_that_fit() -> None:
 
 def test_samples_of_saltelli_exchange_one_column_each() -> None:
     """A, A with one column of B for each parameter, B: the points of Saltelli's design."""
-    points = sampling.unit_samples("saltelli", 3, 8, 5, 0, 40).reshape(8, 5, 3)
+    points = sampling.unit_samples("saltelli", 3, 8, 5).reshape(8, 5, 3)
     first, second = points[:, 0], points[:, 4]
     for matrix in (first, second):
         # A point in each of eight strata.
@@ -145,10 +145,7 @@ def test_samples_of_saltelli_exchange_one_column_each() -> None:
     for j in range(3):
         mixed = np.where(np.arange(3) == j, second, first)
         np.testing.assert_array_equal(points[:, 1 + j], mixed)
-    np.testing.assert_array_equal(
-        sampling.unit_samples("saltelli", 3, 8, 5, 7, 23), points.reshape(40, 3)[7:23]
-    )
-    other = sampling.unit_samples("saltelli", 3, 8, 6, 0, 40)
+    other = sampling.unit_samples("saltelli", 3, 8, 6)
     assert not np.array_equal(other, points.reshape(40, 3))
     assert set(sampling.sampler_versions("saltelli")) == {"scipy_version", "salib_version"}
     assert set(sampling.sampler_versions("random")) == {"scipy_version"}

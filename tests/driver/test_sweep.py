@@ -10,7 +10,6 @@ import shutil
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas
 import pytest
 import scipy
 import xarray as xr
@@ -108,12 +107,8 @@ def test_multiples_are_exact() -> None:
 
 @pytest.mark.parametrize("design", ["random", "latin_hypercube", "sobol"])
 def test_drawn_designs_fill_their_range(design: str) -> None:
-    whole = sampling.unit_samples(design, 3, 256, 5, 0, 256)
-    parts = [
-        sampling.unit_samples(design, 3, 256, 5, a, b) for a, b in ((0, 1), (1, 100), (100, 256))
-    ]
-    np.testing.assert_array_equal(np.concatenate(parts), whole)
-    assert not np.array_equal(sampling.unit_samples(design, 3, 256, 6, 0, 256), whole)
+    whole = sampling.unit_samples(design, 3, 256, 5)
+    assert not np.array_equal(sampling.unit_samples(design, 3, 256, 6), whole)
     if design == "random":
         # Six standard errors of the mean of a uniform distribution.
         assert abs(whole.mean() - 0.5) < 6 / np.sqrt(12 * whole.size)
@@ -331,14 +326,6 @@ def test_fixed_model_is_that_of_the_case_or_has_its_defaults() -> None:
         assert getattr(study.case.model, "rings", None) == rings
 
 
-def test_many_samples_need_a_word(tmp_path: Path) -> None:
-    many: dict[str, Any] = {"name": "a", "design": {"kind": "random", "size": 200_000}}
-    many["parameters"] = {"height": {"low": 0.5, "high": 1}}
-    with pytest.raises(thud.InputError, match=naming("a", 200000, "modal_ball", "yes")):
-        thud.sweep(many, tmp_path)
-    assert not (tmp_path / "a.partial").exists()
-
-
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -383,7 +370,7 @@ def test_many_samples_need_a_word(tmp_path: Path) -> None:
         (
             "parameters = {height=$, mass=$, gravity=$}".replace(
                 "$", "{low=1, high=2, count=10_000_000}"),
-            naming("samples", 2**30, "grid"),
+            naming("samples", 2**24, "grid"),
         ),
         (f"design.seed = 1{'0' * 5000}", naming("TOML")),
         ("parameters.height = {std=1}", naming("height", "values", "grid")),
@@ -449,14 +436,6 @@ def test_bad_studies_are_reported(
     with pytest.raises(thud.InputError, match=words):
         thud.read_study(path)
     assert list(tmp_path.iterdir()) == [path]
-
-
-def test_exploding_designs_are_reported_before_they_are_made() -> None:
-    spread = {"low": 1, "high": 2, "count": 10**9}
-    for design, words in (("grid", naming("samples", 2**30)), ("list", naming("samples", "yes"))):
-        study = {"design": {"kind": design}, "parameters": {"mass": spread, "height": spread}}
-        with pytest.raises(thud.InputError, match=words):
-            thud.sweep(study)
 
 
 def test_numbers_of_numpy_are_numbers() -> None:
@@ -567,27 +546,21 @@ def test_parameters_of_python_are_those_of_files() -> None:
     assert thud.read_study(one).identity == thud.read_study(other).identity
 
 
-@pytest.mark.parametrize(
-    ("kind", "design", "size"),
-    [("sweep", "latin_hypercube", 10**9), ("sensitivity", "saltelli", 2**30)],
-)
-def test_design_that_exceeds_the_memory_is_told(
-    kind: str, design: str, size: int, tmp_path: Path
-) -> None:
-    ranges = 'height = {low = 0.5, high = 1.0, unit = "m"}\nmass = {low = 2.4, high = 2.6}\n'
-    (tmp_path / "large.toml").write_text(
-        f'[design]\nkind = "{design}"\nsize = {size}\n[parameters]\n{ranges}'
-    )
+def test_design_that_exceeds_the_memory_is_told(tmp_path: Path) -> None:
+    # 8 samples of 6 numbers for each of 2**24 base samples: 6 GB.
+    names = ("height", "mass", "gravity", "outer_radius", "wall_thickness", "youngs_modulus")
+    ranges = "\n".join(f"{name} = {{low = 1, high = 2}}" for name in names)
+    (tmp_path / "large.toml").write_text(f"design.size = {2**24}\n[parameters]\n{ranges}\n")
     limit = 4 * 2**30
     done = python(
-        *("-P", "-m", "thud", kind, "-q", "--yes", "large.toml"),
+        *("-P", "-m", "thud", "sensitivity", "-q", "large.toml"),
         cwd=tmp_path,
         env={**os.environ, "OPENBLAS_NUM_THREADS": "1"},
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)),
     )
     assert done.returncode == 1
     (line,) = done.stderr.splitlines()
-    assert re.search(naming("[design] size", size), line)
+    assert re.search(naming("[design] size", 2**24), line)
 
 
 def test_values_by_names_of_keys_are_a_grid() -> None:
@@ -600,8 +573,7 @@ def test_values_by_names_of_keys_are_a_grid() -> None:
     frame = found.to_dataframe()
     assert frame.loc[0.5, 2.6]["floor_octave_63"] == found.dataset["floor_octave"].values[0, 1, 1]
     # Scalars, ranges and columns are arrays, as for `solve_many`.
-    frame = pandas.DataFrame({"height": [0.5, 1.0]})
-    values = {"height": frame["height"], "substeps": range(2, 4), "mass": 2.4}
+    values = {"height": found.dataset["height"], "substeps": range(2, 4), "mass": 2.4}
     assert dict(thud.sweep(values).dataset.sizes) == {
         "height": 2, "substeps": 2, "mass": 1, "octave": 5,
     }  # fmt: skip

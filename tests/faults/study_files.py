@@ -75,7 +75,7 @@ def attempt(chance: random.Random) -> tuple[str, str]:
             if isinstance(study, FitStudy):
                 table = run_fit(study).table()
             else:
-                table = getattr(thud, kind)(study, allow_large=True, workers=1).table()
+                table = getattr(thud, kind)(study, workers=1).table()
     except thud.ThudError as error:
         inner = INNER.search(str(error))
         return ("raw", f"{error}: {text!r}") if inner or "\n" in str(error) else ("failed", "")

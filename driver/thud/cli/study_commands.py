@@ -14,7 +14,6 @@ from thud.cli.command import (
     command,
     figures_of,
     files,
-    flag,
     option,
     output,
 )
@@ -48,8 +47,7 @@ def run_study(options: argparse.Namespace) -> int:
         with dask_executor(scheduler) if scheduler else nullcontext() as executor:
             computed = compute(
                 result, study, folder, figures, executor=executor, workers=options.workers,
-                allow_large=options.allow_large, replace=options.replace,
-                progress=shows_progress(quiet=options.quiet),
+                replace=options.replace, progress=shows_progress(quiet=options.quiet),
             )  # fmt: skip
     except ThudError as error:
         raise error.within(options.study) from error
@@ -74,7 +72,6 @@ for _name, _kind in KINDS.items():
         _kind.help,
         _STUDY,
         *output("the results; an interrupted study resumes there (default: outputs/<study name>)"),
-        flag("--yes", "allow any number of samples", dest="allow_large"),
         _WORKERS,
         option("--scheduler", "ADDRESS", "address of a Dask scheduler, such as tcp://host:8786"),
         NO_FIGURES,

@@ -154,7 +154,7 @@ def _calibrated_mesh(case: Case) -> Case:
 
 def _samples(case: Case, sets: Columns, unknowns: tuple[Unknown, ...]) -> Columns:
     """Return random sets, in which random values of the unknowns replace their keys."""
-    points = unit_samples("random", len(unknowns) + 1, SAMPLES, _SEED, 0, SAMPLES)
+    points = unit_samples("random", len(unknowns) + 1, SAMPLES, _SEED)
     rows = points[:, -1]
     result = {key: column[(rows * len(column)).astype(int)] for key, column in sets.items()}
     for i, unknown in enumerate(unknowns):

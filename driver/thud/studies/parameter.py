@@ -33,8 +33,9 @@ if TYPE_CHECKING:
 
     from thud.case.case import Case
 
-# Maximum number of samples, of values of a parameter, and of base samples.
-MAX_VALUES = 2**30
+# Maximum number of samples, of values of a parameter, and of base samples: their results fill
+# some GB of memory.
+MAX_VALUES = 2**24
 # Entries of the table of a varying parameter besides `unit`, by the entry that selects the form
 # (list, range or normal distribution), and entries of the table of a fitted parameter.
 ENTRIES_BY_FORM = {

@@ -41,8 +41,6 @@ if TYPE_CHECKING:
 
 R = TypeVar("R", bound="SampleResult")
 
-# Maximum number of samples without `allow_large`.
-MAX_SAMPLES = 100_000
 # Maximum time until a scheduler replies and has a worker, s.
 SCHEDULER_TIMEOUT = 5.0
 # Number of blocks that an executor of the caller has at a time: its width is not known.
@@ -59,8 +57,6 @@ class RunOptions(TypedDict, total=False):
     executor : concurrent.futures.Executor or None
         Computes the samples instead, with the same results: processes, or machines by the
         `get_executor` of a Dask client.
-    allow_large : bool
-        Allow any number of samples.
     progress : bool
         Show a progress bar.
     replace : bool
@@ -73,7 +69,6 @@ class RunOptions(TypedDict, total=False):
 
     workers: int | None
     executor: Executor | None
-    allow_large: bool
     progress: bool
     replace: bool
     case: Case | None
@@ -145,8 +140,6 @@ def run(
     OSError
         If results cannot be read or written.
     """
-    if study.count > MAX_SAMPLES and not options.get("allow_large"):
-        refuse(describe(study), f"up to {MAX_SAMPLES} samples, or allow_large=True (--yes)")
     # Raises InputError for a design that does not fit in memory.
     study.parameter_columns(0, 1)
     file = partial = None

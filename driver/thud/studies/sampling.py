@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from functools import lru_cache
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
@@ -11,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thud.base.checks import MAX_SEED, refuse, refuse_unknown, refuse_value, require_whole
+from thud.base.immutable import freeze
 from thud.studies.parameter import MAX_VALUES
 
 if TYPE_CHECKING:
@@ -69,19 +69,12 @@ def read_design(
     return {"design": design, "size": size, "seed": seed}
 
 
-def unit_samples(  # noqa: PLR0913, PLR0917 - the numbers of a design
-    design: str, dimension: int, size: int, seed: int, start: int, stop: int
-) -> Array:
-    """Return points of a design in the unit cube, shape (stop - start, dimension)."""
-    if design == "random":
-        generator = np.random.PCG64(seed).advance(start * dimension)
-        return np.random.Generator(generator).random((stop - start, dimension))
-    return _all_points(design, dimension, size, seed)[start:stop]
-
-
 @lru_cache(maxsize=1)
-def _all_points(design: str, dimension: int, size: int, seed: int) -> Array:
-    """Return all points of a design that is not sampled block by block."""
+def unit_samples(design: str, dimension: int, size: int, seed: int) -> Array:
+    """Return the points of a design in the unit cube, shape (n_sample, dimension), read-only.
+
+    A ``"saltelli"`` design has `dimension` + 2 samples for each of the `size` base samples.
+    """
     try:
         if design == "saltelli":
             from SALib.sample import sobol as saltelli
@@ -89,14 +82,13 @@ def _all_points(design: str, dimension: int, size: int, seed: int) -> Array:
             names = list(map(str, range(dimension)))
             cube = {"num_vars": dimension, "names": names, "bounds": [[0.0, 1.0]] * dimension}
             points = saltelli.sample(cube, size, calc_second_order=False, seed=seed)
+        elif design == "random":
+            points = np.random.Generator(np.random.PCG64(seed)).random((size, dimension))
         else:
             from scipy.stats import qmc
 
             engine = qmc.Sobol if design == "sobol" else qmc.LatinHypercube
-            with warnings.catch_warnings():
-                # The training of a surrogate takes parts of Sobol's sequence.
-                warnings.simplefilter("ignore", UserWarning)
-                points = engine(dimension, rng=seed).random(size)
-        return np.asarray(points, dtype=np.float64)
+            points = engine(dimension, rng=seed).random(size)
+        return freeze(np.asarray(points, dtype=np.float64))
     except MemoryError as error:
         refuse(f"[design] size = {size} of kind {design} does not fit in memory", "fewer", error)

@@ -25,6 +25,7 @@ from thud.base.checks import (
     shown,
 )
 from thud.base.errors import InputError
+from thud.base.extras import require_extra
 from thud.base.toml_tables import read_toml
 from thud.case.case import Case, check_case, impact_only, new_model, read_case
 from thud.case.keys import DENSITY, TEMPERATURE, find_key, value_in, with_values
@@ -32,13 +33,13 @@ from thud.studies.kinds import KINDS
 from thud.studies.parameter import Parameter, read_quantity, read_value, read_varied
 from thud.studies.sampling import read_design, sampler_versions, unit_samples
 from thud.studies.temperature import read_temperature
-from thud.studies.trained_surrogate import Surrogate, read_surrogate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator
 
     from thud.studies.arrays import Columns
     from thud.studies.temperature import Temperature
+    from thud.studies.trained_surrogate import Surrogate
 
 
 # Types that a study is read from.
@@ -151,10 +152,8 @@ class Study:
             return {p.name: p.grid()[i] for p, i in zip(self.parameters, indices, strict=True)}
         if self.design == "list":
             return {p.name: p.grid()[start:stop] for p in self.parameters}
-        fractions = unit_samples(
-            self.design, len(self.parameters), self.size, self.seed, start, stop
-        )
-        return {p.name: p.quantiles(fractions[:, i]) for i, p in enumerate(self.parameters)}
+        points = unit_samples(self.design, len(self.parameters), self.size, self.seed)[start:stop]
+        return {p.name: p.quantiles(points[:, i]) for i, p in enumerate(self.parameters)}
 
     def key_columns(self, columns: Columns) -> Columns:
         """Return samples of `parameter_columns` as values of keys, shape (n_sample,).
@@ -228,12 +227,10 @@ def read_tables(
     """Yield tables, folder and text of a study; InputErrors within the block name its file."""
     if isinstance(source, Mapping):
         if source and not {*source} & {*COMMON_KEYS, *_SAMPLE_KEYS, "target"}:
-            entries = {
-                name: entry
-                if isinstance(entry, Mapping | Parameter)
-                else {"values": np.atleast_1d(require_array(name, entry, (0, 1)))}
-                for name, entry in source.items()
-            }
+            entries: dict[str, Any] = dict(source)
+            for name, entry in entries.items():
+                if not isinstance(entry, Mapping | Parameter):
+                    entries[name] = {"values": np.atleast_1d(require_array(name, entry, (0, 1)))}
             source = {"parameters": entries}
         try:
             text = json.dumps(source, default=_plain)
@@ -362,6 +359,8 @@ def _read_parameter(name: str, entry: object, case: Case, density: float | None)
 
 def with_surrogate(study: Study, surrogate: Surrogate | str | os.PathLike[str]) -> Study:
     """Return a study whose samples a surrogate predicts; raise InputError if it cannot."""
+    with require_extra("studies"):
+        from thud.studies.trained_surrogate import Surrogate, read_surrogate
     if study.case.floor:
         refuse("[surrogate] is not allowed with a floor", "a case without &floor")
     trained = surrogate if isinstance(surrogate, Surrogate) else read_surrogate(surrogate)

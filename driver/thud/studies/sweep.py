@@ -72,7 +72,7 @@ def sweep(
     output
         Directory of the results; an interrupted study is continued. None: they are not written.
     **options
-        Keywords `case`, `surrogate`, `workers`, `executor`, `allow_large`, `progress`, `replace`;
+        Keywords `case`, `surrogate`, `workers`, `executor`, `progress`, `replace`;
         see `thud.studies.run.RunOptions`.
 
     Returns

@@ -254,7 +254,7 @@ def starts_of(ranges: Sequence[Range], count: int, seed: int) -> Iterator[Array]
         return
     low, high = np.array([np.array(entry.spread) / entry.scale for entry in ranges]).T
     shape = len(ranges), count - 1
-    for x in unit_samples("latin_hypercube", *shape, seed, 0, count - 1):
+    for x in unit_samples("latin_hypercube", *shape, seed):
         yield low + x * (high - low)
 
 
