@@ -699,7 +699,7 @@ def test_first_answer_is_in_the_page_but_no_case_of_a_user(client: TestClient) -
         return re.findall(r'id="first_answer">(.*?)</script>', content, re.DOTALL)[0]
 
     first = json.loads(first_of(client.get("/").text))
-    assert first["values"] == client.get("/about").json()["presets"][0]["values"]
+    assert first["values"] == {"model": {"name": "modal_ball"}}
     assert first["answer"]["result"] == "conforms"
     start = {"model": {"name": "hollow_sphere"}}
     application = server.new_application(start, token=TOKEN, hosts=("127.0.0.1",))
@@ -753,12 +753,10 @@ def test_downloads_are_what_they_say(client: TestClient, tmp_path: Path) -> None
     )
 
 
-@pytest.mark.parametrize("name", ["standard_ball", "finite_elements", "tyre", "slab"])
+@pytest.mark.parametrize("values", [{}, MODES, SHELL | FLOOR | {"room": {"volume": 30.0}}])
 def test_script_computes_the_case(
-    client: TestClient, name: str, capsys: pytest.CaptureFixture[str]
+    client: TestClient, values: dict[str, Any], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    presets = client.get("/about").json()["presets"]
-    (values,) = (preset["values"] for preset in presets if preset["name"] == name)
     text = last_report(client, "/download/case.py", json=values)["answer"]
     namespace: dict[str, Any] = {}
     exec(compile(text, "case.py", "exec"), namespace)  # noqa: S102 - it is the result

@@ -1,4 +1,4 @@
-"""What the page says of models, floors and keys, its presets, its errors and its headlines."""
+"""What the page says of models, floors and keys, its errors and its headlines."""
 
 from __future__ import annotations
 
@@ -24,7 +24,6 @@ from thud.explorer.models import (
     model_facts,
     users_of,
 )
-from thud.explorer.presets import presets
 from thud.floors.description import CONTRIBUTIONS
 from thud.impact.compute import compute
 
@@ -206,15 +205,10 @@ def test_duration_that_a_message_allows_is_accepted(modulus: float) -> None:
         assert "is too short" not in str(error)
 
 
-@pytest.mark.parametrize("preset", presets(), ids=lambda preset: preset["name"])
-def test_presets_have_an_answer(preset: dict[str, Any]) -> None:
-    answer = answer_case(new_case(preset["values"]))
-    is_floor = preset["door"] == "floor"
-    assert ("room" in answer) == is_floor
-    if "standard" in preset["name"] or preset["name"] == "finite_elements":
-        assert answer["result"] == "conforms"
-    # The page begins with the first.
-    assert presets()[0]["door"] == "ball"
+SLAB: dict[str, Any] = {
+    "model": {"name": "modal_ball"}, "floor": {"name": "plate"}, "room": {},
+    "plate": vars(thud.construction("concrete 180").floor),
+}  # fmt: skip
 
 
 def _by_shell(values: dict[str, Any]) -> dict[str, Any]:
@@ -224,8 +218,7 @@ def _by_shell(values: dict[str, Any]) -> dict[str, Any]:
 
 
 def test_headline_of_a_room_is_the_level_with_its_range() -> None:
-    (slab,) = (preset["values"] for preset in presets() if preset["name"] == "slab")
-    answer = answer_case(new_case(slab))
+    answer = answer_case(new_case(SLAB))
     prediction = thud.predict_level(floor=thud.construction("concrete 180").floor, room=thud.Room())
     room = answer["room"]
     rating = prediction.rating
@@ -240,10 +233,10 @@ def test_headline_of_a_room_is_the_level_with_its_range() -> None:
     ]
     assert room["uncertainty"] == pytest.approx(prediction.uncertainty, abs=1e-4)
     for required, result in ((40.0, "does_not_conform"), (58.0, "undecided"), (80.0, "conforms")):
-        values = {**slab, "room": {"required": required, "rating": "thirds"}}
+        values = {**SLAB, "room": {"required": required, "rating": "thirds"}}
         assert answer_case(new_case(values))["room"]["result"] == result
     # A source that does not conform, and another rating than that of the standard headline.
-    values = {**_by_shell(slab), "room": {"required": 49.0}}
+    values = {**_by_shell(SLAB), "room": {"required": 49.0}}
     room = answer_case(new_case(values))["room"]
     assert room["result"] == "undecided"
     assert "the source does not conform" in room["detail"]
@@ -264,9 +257,8 @@ def test_group_without_effect_is_refused() -> None:
 
 
 def test_headline_of_a_room_names_its_rating() -> None:
-    (slab,) = (preset["values"] for preset in presets() if preset["name"] == "slab")
     for rating, title in RATINGS.items():
-        case = new_case({**slab, "room": {"required": 49.0, "rating": rating}})
+        case = new_case({**SLAB, "room": {"required": 49.0, "rating": rating}})
         assert answer_case(case)["room"]["detail"].startswith(title)
 
 

@@ -76,7 +76,7 @@ def new_page(
     page.set_default_timeout(TIMEOUT)
     page.on("pageerror", lambda error: pytest.fail(str(error)))
     page.goto(address)
-    page.locator("#preset_standard_ball").wait_for()
+    page.locator("#model").wait_for()
     settle(page)
     return page
 
@@ -518,10 +518,10 @@ def test_variants_are_named_by_what_differs(page: Page) -> None:
     page.reload()
     settle(page)
     # Differences to the first, in the table and in the plots.
-    click(page, "#preset_tyre")
-    assert names_of(page)[:2] == ["Tyre", "Standard ball"]
+    choose(page, "#model", "two_mass")
+    assert names_of(page)[:2] == ["Tyre: belt and rim", "Standard ball"]
     expect(page.locator("#variants tbody tr").nth(1)).to_contain_text("−")
-    rename(page, "Tyre", "Ours")
+    rename(page, "Tyre: belt and rim", "Ours")
     assert names_of(page)[0] == "Ours"
     for _ in range(3):
         page.locator("#variants .remove").first.click()
@@ -556,14 +556,6 @@ def test_recordings_and_models_are_compared_and_fitted(page: Page) -> None:
     modulus = float(field(page, "ball.youngs_modulus").input_value())
     assert 1.4 < modulus < 1.6
     assert len(names_of(page)) == 2
-
-
-def test_presets_say_which_ball_to_use(page: Page) -> None:
-    lines = page.locator("#inputs fieldset").first.locator("li")
-    expect(lines).to_have_text([re.compile("Use it by default"), re.compile("A check at")])
-    page.locator("#preset_aged_ball").click()
-    expect(lines).to_have_count(3)
-    see(page, key="ball.youngs_modulus").to_have_value("2.472")
 
 
 def test_press_curve_sets_the_modulus_of_the_ball(page: Page) -> None:
@@ -1063,8 +1055,8 @@ def test_source_moves_in_step_with_the_force(page: Page) -> None:
     page.locator("#play").click()
     see(page, "#play").to_have_text("Play")
     pixels = "box => box.toDataURL()"
-    for preset in ("finite_elements", "shell"):
-        click(page, f"#preset_{preset}")
+    for model in ("finite_element", "hollow_sphere"):
+        choose(page, "#model", model)
         slider = page.locator("#instant")
         images = []
         for value in ("0.1", "0.5"):
@@ -1140,14 +1132,6 @@ def test_asked_values_follow_the_files_that_were_chosen(page: Page) -> None:
     see(page, "#assess").to_be_focused()
 
 
-def test_chosen_preset_moves_no_other(page: Page) -> None:
-    places = """() => [...document.querySelectorAll(".choices button, #doors button")]
-        .map((box) => JSON.stringify(box.getBoundingClientRect()))"""
-    before = page.evaluate(places)
-    click(page, "#preset_shell")
-    assert page.evaluate(places) == before
-
-
 def test_column_of_inputs_ends_with_a_whole_row_and_its_folded_fields(page: Page) -> None:
     more = page.locator("#inputs .folded summary")
     expect(more).to_be_in_viewport(ratio=1)
@@ -1218,7 +1202,7 @@ def test_construction_is_chosen_by_typing_its_name(page: Page) -> None:
 def test_page_is_accessible(browser: Browser, server: Served, width: int, scheme: str) -> None:
     page = new_page(browser, server[0], width, scheme)
     page.locator("#keep").click()
-    click(page, "#preset_shell")
+    choose(page, "#model", "hollow_sphere")
     page.locator("#inputs .folded summary").click()
     for door in ("ball", "floor", "recording"):
         if door != "ball":

@@ -103,16 +103,16 @@ def input_case(name: str) -> Case:
 
 MODEL_FACTS = {
     "modal_ball": Facts(
-        "Modal ball",
-        "A rubber ball, computed while a slider moves: the exact modes of the sphere",
+        "Standard ball",
+        "Use it by default: the exact modes of a rubber sphere, computed while a slider moves",
         "Octaves from 31.5 to 500 Hz within 1.1 dB of nominal. The modes are linear: their modulus "
         "is an effective one.",
         tuned=("loss_factor", *_MADE),
         fitted=("youngs_modulus", "loss_factor"),
     ),
     "finite_element": Facts(
-        "Finite elements",
-        "A rubber ball in detail: large strains, gas, losses and friction",
+        "Standard ball, finite elements",
+        "A check at large strain: a rubber ball in detail, with gas, losses and friction",
         "Octaves from 31.5 to 500 Hz within 1 dB of nominal; 500 Hz follows from the damping law.",
         unused=("gauge_pressure",),
         tuned=("loss_factor", *_MADE),

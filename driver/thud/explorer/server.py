@@ -35,7 +35,6 @@ from thud.explorer.jobs import INPUT_ERRORS, Jobs
 from thud.explorer.messages import describe_error
 from thud.explorer.models import floor_facts, model_facts
 from thud.explorer.page_file import first_answer, render_page
-from thud.explorer.presets import presets
 from thud.explorer.recording_fields import FIELDS
 
 if TYPE_CHECKING:
@@ -126,12 +125,12 @@ def new_application(
         "recording": list(map(asdict, FIELDS)),
         "models": model_facts(),
         "floors": floors,
-        "presets": presets(),
         "start": start,
         "max_recording": MAX_RECORDING,
     }
     # The page itself is sent without a token, and holds nothing of a user.
-    application.state.first = None if start else first_answer(presets()[0]["values"])
+    first = {"model": {"name": application.state.about["models"][0]["name"]}}
+    application.state.first = None if start else first_answer(first)
     application.state.offered = [
         values.get(group, {}).get(name)
         for values in (start, *(facts["values"] for facts in floors))

@@ -3,7 +3,7 @@ import { byId, button, element, saveFile } from "thud/page.js";
 import { ConnectionError, ask, firstAbout, fragment, setFragment, takeFragment } from "thud/request.js";
 import { firstVariant } from "thud/first.js";
 import { listenToBall } from "thud/ball.js";
-import { about, caseValues, invalidField, isCase, state, takeValues } from "thud/form.js";
+import { about, caseValues, fillConstruction, invalidField, isCase, state, takeValues } from "thud/form.js";
 import { addFiles, recording } from "thud/recording.js";
 import { addPlotButtons, copyText, fileOf } from "thud/files.js";
 import { RETRY_INTERVAL, current, hideMessage, holdForClicks, kept, reconnect, showError, showMessage } from "thud/answers.js";
@@ -67,11 +67,11 @@ function reset() {
   commit();
 }
 
-/** Begin with the values of a case, or with the first preset. */
+/** Begin with the values of a case, or with the first model, a slab and the room below. */
 function begin(start) {
-  Object.assign(state, { values: {}, unknowns: {}, recording: {}, titles: {}, model: "" });
-  const floors = about.presets.find((preset) => preset.door === "floor");
-  takeValues(floors.values);
+  Object.assign(state, { values: {}, unknowns: {}, recording: {}, titles: {}, model: "", room: true });
+  takeValues({});
+  fillConstruction("concrete 180");
   if (Object.keys(start).length) takeValues(start);
   openDoor(start.floor || start.room ? "floor" : "ball");
 }

@@ -1,6 +1,6 @@
-// The case and its form: fields of the keys, presets, models, constructions and the room.
+// The case and its form: fields of the keys, models, constructions and the room.
 import {
-  button, byId, capitalize, element, fieldRow, numberOf, numberProblem, scaled, select,
+  byId, capitalize, element, fieldRow, numberOf, numberProblem, scaled, select,
 } from "thud/page.js";
 import { pressInputs } from "thud/press.js";
 
@@ -102,7 +102,7 @@ export function isCase(values) {
 
 /** Take over the source of a case, or all of it. */
 export function takeValues(values) {
-  const { model, floor, ...rest } = values.model ? values : { ...values, ...about.presets[0].values };
+  const { model = { name: about.models[0].name }, floor, ...rest } = values;
   const clear = (groups) => groups.flatMap(({ fields }) => fields)
     .forEach(({ group }) => delete state.values[group]);
   clear(sourceGroups());
@@ -153,7 +153,7 @@ function findConstruction() {
 }
 
 /** Fill the fields of floor and ceiling by a construction; a ceiling needs the room below. */
-function fillConstruction(name) {
+export function fillConstruction(name) {
   const construction = about.constructions.find((entry) => entry.name === name);
   if (!construction) return;
   const { floor, keys, room } = construction;
@@ -195,30 +195,15 @@ function replaceInputs(children) {
   kept.append(...children[at].querySelectorAll(":scope > .help"));
 }
 
-const balls = () => about.presets.filter(({ door }) => door === "ball");
-
 /** Return whether fields have the values of a case or, where it states none, their defaults. */
 const haveValues = (fields, values) => fields.every((field) =>
   isSame(valueOf(field), values[field.group]?.[field.name] ?? defaultOf(field)));
 
-/** Return whether the source of the form is that of a preset. */
-const isChosen = ({ values }) => values.model.name === state.model && !state.unknowns[state.model]
-  && sourceGroups().every(({ fields }) => haveValues(fields.filter(isUsed), values));
-
 function ballInputs(handlers) {
-  const choose = ({ values }) => { takeValues(values); handlers.rebuild(); };
-  const choices = balls().map((preset) => button(preset.title, () => choose(preset),
-    { id: `preset_${preset.name}`, "aria-pressed": String(isChosen(preset)), title: preset.text }));
-  // The first two are both standard balls, and their lines say which to trust.
-  const lines = balls().filter((preset, i) => i < 2 || isChosen(preset));
   const common = commonGroups();
   const own = findGroup("model", state.model);
   return [
-    element("fieldset", {}, element("legend", {}, "Start from"),
-      element("div", { class: "choices" }, ...choices), pressInputs(handlers.onPress),
-      element("ul", { class: "help" }, ...lines.map(({ title, text }) =>
-        element("li", {}, element("b", {}, title), `: ${text}.`)))),
-    kindInput("model", "Model", about.models, handlers),
+    kindInput("model", "Model", about.models, handlers), pressInputs(handlers.onPress),
     ...[...common.slice(0, 2), own, ...common.slice(2)].map((group) => groupElement(group, handlers)),
     foldedElement([own, ...common], handlers),
   ];
@@ -241,10 +226,6 @@ function floorInputs(handlers) {
   const isRequirement = ({ name }) => ["required", "rating"].includes(name);
   const fieldsOfRoom = (title, isOwn) => (showsRoom()
     ? groupElement({ ...room, title, fields: room.fields.filter(isOwn) }, handlers, sources) : "");
-  const source = balls().find(isChosen);
-  const known = balls().map(({ name, title }) => [name, title]);
-  const droppable = source ? known : [["", "A changed source"], ...known];
-  const takeSource = (name) => takeValues(balls().find((preset) => preset.name === name).values);
   const box = element("input", { type: "checkbox", id: "has_room" });
   box.checked = showsRoom();
   box.disabled = !hasRoom();
@@ -253,7 +234,7 @@ function floorInputs(handlers) {
     choiceOf("construction", "Construction", [["", "None of the library"], ...options],
       construction?.name ?? "", (name) => { fillConstruction(name); handlers.rebuild(); },
       element("p", { class: "help", id: "construction_text" }, textOfConstruction(construction))),
-    choiceOf("source", "Dropped on it", droppable, source?.name ?? "", (name) => { takeSource(name); handlers.rebuild(); }),
+    kindInput("model", "Dropped on it", about.models, handlers),
     fieldsOfRoom("Requirement", isRequirement),
     element("label", { class: "toggle" }, box, "Room below"),
     fieldsOfRoom(room.title, (field) => !isRequirement(field)),
@@ -304,7 +285,7 @@ function fieldElement(field, handlers, source) {
     else if (activeElement.type !== "range") handlers.rebuild();
     // A slider is dragged to its end first.
     else activeElement.addEventListener("change", handlers.rebuild, { once: true });
-    showChoices();
+    showConstruction();
   };
   const { kind, label, unit, help } = field;
   const newInputs = { real: numberInput, whole: numberInput, list: listInput }[kind] ?? plainInput;
@@ -318,10 +299,8 @@ function fieldElement(field, handlers, source) {
     element("p", { class: "error", id: `${id}.error` }));
 }
 
-/** Show which preset or construction the form has. */
-function showChoices() {
-  for (const preset of balls())
-    byId(`preset_${preset.name}`)?.setAttribute("aria-pressed", String(isChosen(preset)));
+/** Show which construction the form has. */
+function showConstruction() {
   if (!byId("construction")) return;
   const construction = findConstruction();
   byId("construction").value = construction?.name ?? "";

@@ -42,20 +42,19 @@ export function nameVariants(variants) {
   }
 }
 
-/** Return the preset or construction that is closest to a case, and the keys that differ. */
+/** Return the model and the construction that are closest to a case, and the keys that differ. */
 function describe({ values, chosen }) {
   const { model, floor } = values;
   const isFloor = (group) => Boolean(floor) && (group === floor.name || group === "room");
   const isSource = (group) => !isFloor(group) && !["model", "floor", "unknowns"].includes(group);
-  const presets = about.presets.filter(({ door, values: own }) => door === "ball" && own.model.name === model.name);
   const ownModel = factsOf("model", model.name);
-  const source = closest(values, isSource, [...presets, { title: ownModel.title, values: { model, ...ownModel.values } }]);
+  const source = closest(values, isSource, [{ ...ownModel, values: { model, ...ownModel.values } }]);
   if (!floor) return source;
   const constructions = about.constructions.filter((entry) => entry.floor === floor.name)
     .map((entry) => ({ title: entry.name, values: { [floor.name]: entry.keys, room: entry.room } }))
     .sort((one, other) => (other.title === chosen) - (one.title === chosen));
   const found = closest(values, isFloor, [...constructions, factsOf("floor", floor.name)]);
-  const isStandard = source.base === about.presets[0].title && !source.changes.size;
+  const isStandard = source.base === about.models[0].title && !source.changes.size;
   return {
     base: isStandard ? found.base : `${found.base}, ${source.base.toLowerCase()}`,
     changes: new Set([...found.changes, ...source.changes]),
