@@ -13,7 +13,7 @@ from thud.base.checks import MAX_NUMBER, refuse, require_array, require_choice, 
 from thud.base.display import Tabulated
 
 if TYPE_CHECKING:
-    from collections.abc import Container
+    from collections.abc import Collection
 
     from numpy.typing import ArrayLike, NDArray
 
@@ -152,7 +152,7 @@ def peak_count(force: ArrayLike, sample_rate: float) -> int:
 
 
 def finite_array(
-    name: str, values: ArrayLike, dimensions: Container[int] = (1,),
+    name: str, values: ArrayLike, dimensions: Collection[int] = (1,),
     span: tuple[float, float] = (-MAX_NUMBER, MAX_NUMBER), unit: str = "",
 ) -> NDArray[np.float64]:  # fmt: skip
     """Return an array of finite numbers; raise InputError if it is none, empty or out of range."""
