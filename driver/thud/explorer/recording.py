@@ -103,30 +103,22 @@ def _config_of(paths: Sequence[str], table: Mapping[str, Any]) -> Config:
 
 
 def _asks(recording: Recording, verdict: Verdict) -> list[dict[str, Any]]:
-    """Return the fields that change the verdict and are not stated, with estimates and reasons."""
+    """Return the fields that change the verdict and are not stated, with estimates.
+
+    Each has the code of the reason and what this is about: the frequency at which the plate rings,
+    Hz, or the title of a level.
+    """
     config = recording.config
     ringing = next((drop.ringing for drop in recording.drops if drop.ringing), None)
     result: list[dict[str, Any]] = []
     if ringing:
-        reason = (
-            f"The force plate rings at {ringing.frequency:.0f} Hz after the contact, which changes "
-            "levels up to 500 Hz. State its resonance; the values are estimates from the record."
-        )
-        values = {"plate_f0": f"{ringing.frequency:.0f}", "plate_Q": f"{ringing.quality:.2g}"}
-        result.append({"reason": reason, "values": values})
+        frequency = f"{ringing.frequency:.0f}"
+        values = {"plate_f0": frequency, "plate_Q": f"{ringing.quality:.2g}"}
+        result.append({"code": "plate_rings", "subject": frequency, "values": values})
     title, contribution = largest_contribution(verdict) or ("", "")
     if contribution == ASSUMED_SHARE:
-        reason = (
-            f"{title} depends on the share of the resonance in the static response of the plate: "
-            "1 if no other mode is as stiff, else less. Taps with hammers of different hardness "
-            "show it."
-        )
-        result.append({"reason": reason, "values": {"plate_share": ""}})
+        result.append({"code": "share_assumed", "subject": title, "values": {"plate_share": ""}})
     missing = [name for name in ("height", "mass") if getattr(config, name) is None]
     if missing:
-        reason = (
-            "Without drop height and mass of the source these criteria are undecided, and the "
-            "restitution is known only if the file holds bounces."
-        )
-        result.append({"reason": reason, "values": dict.fromkeys(missing, "")})
+        result.append({"code": "missing", "subject": "", "values": dict.fromkeys(missing, "")})
     return result

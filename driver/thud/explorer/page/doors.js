@@ -189,7 +189,7 @@ function onChange() {
 export const formHandlers = { onChange, onTyping, onInvalid, onPress };
 listenToAnswers({
   onAnswer: () => { showAll(); commitSoon(); },
-  onMissing: (name) => showAsks([{ reason: "", values: { [name]: "" } }], formHandlers),
+  onMissing: (name) => showAsks([{ values: { [name]: "" } }], formHandlers),
 });
 
 // ---- Actions.

@@ -8,6 +8,17 @@ import { ServerError } from "thud/request.js";
 const FILES_HELP = "One file, or the drops of one measurement: WAV, FLAC, CSV, HDF5, UFF 58, "
   + "MATLAB or TDMS; with it the laboratory’s TOML file";
 
+// Why values are asked for, by code.
+const REASONS = {
+  plate_rings: (frequency) => `The force plate rings at ${frequency} Hz after the contact, which `
+    + "changes levels up to 500 Hz. State its resonance; the values are estimates from the record.",
+  share_assumed: (level) => `${level} depends on the share of the resonance in the static response `
+    + "of the plate: 1 if no other mode is as stiff, else less. Taps with hammers of different "
+    + "hardness show it.",
+  missing: () => "Without drop height and mass of the source these criteria are undecided, and the "
+    + "restitution is known only if the file holds bounces.",
+};
+
 /** Files of the recording, drops of one measurement. */
 export const recording = { files: [] };
 /** What the answer asks for, between the files and the other fields. */
@@ -127,8 +138,8 @@ export function showAsks(asks, { onChange, onTyping }) {
     const id = `ask_${name}`;
     return fieldRow(id, field.label, newInput(id, field, state.recording[name] ?? value, onTyping));
   };
-  const cards = asks.map(({ reason, values }) => element("div", {},
-    reason ? element("p", {}, reason) : "", ...Object.entries(values).map(rowOf)));
+  const cards = asks.map(({ code, subject, values }) => element("div", {},
+    code ? element("p", {}, REASONS[code](subject)) : "", ...Object.entries(values).map(rowOf)));
   const send = () => {
     for (const { name, value } of asked.querySelectorAll("input")) setStated(name, value);
     onChange();
