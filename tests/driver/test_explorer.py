@@ -272,14 +272,6 @@ def test_floor_and_room_are_answered(client: TestClient) -> None:
     assert len(answer["room"]["level"]) == 12
 
 
-def test_recording_of_a_ball_that_is_not_known_is_shown(client: TestClient) -> None:
-    content = (REPOSITORY / "inputs/recordings/drop_1.csv").read_bytes()
-    report = measured(client, content, name="drop_1.csv")
-    assert "restitution" not in [name for name, *_ in report["answer"]["numbers"]]
-    warnings = report["answer"]["warnings"]
-    assert any("ring" in warning for warning in warnings)
-
-
 WAV = (REPOSITORY / "inputs/recordings/drop_1.wav").read_bytes()
 LABORATORY = (REPOSITORY / "inputs/recordings/lab.toml").read_bytes()
 
@@ -387,21 +379,6 @@ def test_errors_of_a_recording_name_their_fields(
         assert " 0 to 50" in report["error"]
     # Names of copies are those of the files, without a folder.
     assert tempfile.gettempdir() not in report["error"]
-
-
-def test_load_cells_are_named_like_the_fields(client: TestClient) -> None:
-    pulse = half_sine(48000.0, 0.3, round(0.6 * 48000))
-    noise = np.random.default_rng(1).normal(scale=0.5, size=(2, len(pulse)))
-    time = np.arange(len(pulse)) / 48000
-    text = io.StringIO()
-    cells = np.column_stack([time, *(pulse / 2 + noise)])
-    np.savetxt(text, cells, "%.9g", ",", header="time_s,F1_N,F2_N", comments="")
-    content = text.getvalue().encode()
-    report = measured(client, content, name="cells.csv")
-    assert report["field"] == "channels"
-    query = {"name": "cells.csv", "channels": "sum"}
-    warnings = measured(client, content, **query)["answer"]["warnings"]
-    assert warnings
 
 
 # Names of files that are no plain names.

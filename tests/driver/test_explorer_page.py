@@ -148,13 +148,13 @@ def open_door(page: Page, door: str) -> None:
     click(page, f"#door_{door}")
 
 
-def drop_file(page: Page, content: bytes, name: str) -> None:
-    """Drop a file on the page."""
-    page.evaluate(
-        """([bytes, name]) => {
+def drop_file(page: Page, content: bytes, name: str, selector: str = "body") -> None:
+    """Drop a file on an element of the page."""
+    page.locator(selector).evaluate(
+        """(target, [bytes, name]) => {
             const data = new DataTransfer();
             data.items.add(new File([Uint8Array.from(atob(bytes), (c) => c.charCodeAt(0))], name));
-            document.body.dispatchEvent(
+            target.dispatchEvent(
                 new DragEvent("drop", { dataTransfer: data, bubbles: true, cancelable: true }));
         }""",
         [b64encode(content).decode(), name],
@@ -344,12 +344,7 @@ def test_results_of_other_values_are_dimmed(page: Page) -> None:
     see(page, "#message").to_have_text("Height: enter a number, in m")
     enter(page, "drop.height", "1")
     see(page, "#message").to_be_hidden()
-
-    def delay(route: Route) -> None:
-        time.sleep(1)
-        route.continue_()
-
-    page.route("**/solve", delay)
+    slow_down(page, "solve")
     fill(page, "drop.height", "0.9")
     see(page, "body").to_have_class(outdated)
     see(page, "#panel").to_have_attribute("aria-busy", "true")
@@ -563,15 +558,8 @@ def test_press_curve_sets_the_modulus_of_the_ball(page: Page) -> None:
     rows = [f"{1e3 * x:.5g},{y:.5g}" for x, y in zip(curve.deflection, curve.force, strict=True)]
     page.locator("#press summary").click()
     # A drop on this zone is a curve, not a recording.
-    page.evaluate(
-        """(text) => {
-            const data = new DataTransfer();
-            data.items.add(new File([text], "press 7.csv"));
-            document.getElementById("press_zone").dispatchEvent(
-                new DragEvent("drop", { dataTransfer: data, bubbles: true, cancelable: true }));
-        }""",
-        "\n".join(["deflection (mm),force (N)", *rows]),
-    )
+    content = "\n".join(["deflection (mm),force (N)", *rows]).encode()
+    drop_file(page, content, "press 7.csv", "#press_zone")
     see(page, "#result").to_contain_text("Fitted to press 7.csv: Young's mod")
     settle(page)
     see(page, "#result > p").to_contain_text("% of the largest force")
@@ -1098,6 +1086,13 @@ def test_keyboard_alone_opens_all_doors(page: Page) -> None:
         if page.locator("#file").evaluate("box => box === document.activeElement"):
             break
     see(page, "#file").to_be_focused()
+    # Values that are asked for follow the files.
+    load(page)
+    page.locator("#file").focus()
+    for count, target in ((2, "#ask_plate_f0"), (4, "#assess")):
+        for _ in range(count):
+            page.keyboard.press("Tab")
+        see(page, target).to_be_focused()
 
 
 # Whether the focus is in an element.
@@ -1118,18 +1113,6 @@ def test_tab_goes_from_the_doors_through_the_inputs_to_the_results(page: Page) -
                 stops.append(inputs.evaluate(HAS_FOCUS))
         assert stops[0]
         assert stops == sorted(stops, reverse=True)
-
-
-def test_asked_values_follow_the_files_that_were_chosen(page: Page) -> None:
-    open_door(page, "recording")
-    load(page)
-    page.locator("#file").focus()
-    for _ in range(2):
-        page.keyboard.press("Tab")
-    see(page, "#ask_plate_f0").to_be_focused()
-    for _ in range(4):
-        page.keyboard.press("Tab")
-    see(page, "#assess").to_be_focused()
 
 
 def test_column_of_inputs_ends_with_a_whole_row_and_its_folded_fields(page: Page) -> None:
