@@ -219,6 +219,7 @@ def test_does_my_recording_conform(page: Page, tmp_path: Path) -> None:
     settle(page)
     see(page, "#door_recording").to_have_attribute("aria-selected", "true")
     see(page, "#verdict").to_contain_text("drop_1.csv, 1 drop")
+    see(page, "#verdict").to_contain_text("not known: restitution, force peaks, mass, drop height")
     # The plate rings, and is asked for at once, with what the record shows of it.
     asks = page.locator("#asks")
     expect(asks).to_contain_text("The force plate rings")
