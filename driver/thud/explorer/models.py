@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import f90nml
 
 from thud.base._schema import FLOORS, MODELS
 from thud.base.files import inputs_folder
-from thud.case.case import Case
 from thud.case.keys import humanize
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Iterable, Mapping
 
     from thud.base.key import Key
+    from thud.case.case import Case
 
     Values = dict[str, dict[str, object]]
 
@@ -39,8 +38,8 @@ class Facts:
         Title; by default the name in words.
     purpose, validity : str
         What it is for, and how far its results can be trusted: one line each.
-    case : callable or None
-        Function that returns the case with whose values the page begins; None: the defaults.
+    example : str
+        Example input with whose values the page begins; empty: the defaults.
     unused, tuned, fitted : tuple of str
         Keys of all models without effect on this one; parameters of a source that may be changed so
         that it conforms; those that a recording determines.
@@ -51,54 +50,34 @@ class Facts:
     title: str = ""
     purpose: str = ""
     validity: str = ""
-    case: Callable[[], Case] | None = None
+    example: str = ""
     unused: tuple[str, ...] = ()
     tuned: tuple[str, ...] = ()
     fitted: tuple[str, ...] = ()
     has_room: bool = True
 
     def data(self, name: str) -> dict[str, Any]:
-        """Return the facts of a model or a floor with a name, for the page.
-
-        Its values are those with which the page begins, if not the defaults, by group and key.
-        """
-        values = changed_values(self.case()) if self.case else {}
-        floor = str(values.get("floor", {}).get("name", ""))
-        own = [floor] if floor else [group for group in values if group != "model"]
+        """Return the facts of a model or a floor with a name, for the page."""
         return {
             "name": name,
             "title": self.title or humanize(name).capitalize(),
             "purpose": self.purpose,
             "validity": self.validity,
-            "values": {group: values[group] for group in own if group in values},
+            "values": _stated(self.example) if self.example else {},
             "has_room": self.has_room,
         }
 
 
-def changed_values(case: Case) -> Values:
-    """Return names of model and floor, and the values that differ from their defaults, by group."""
-    groups = case.to_namelist()
-    names = {
-        group: {"name": groups[group]["name"]} for group in ("model", "floor") if group in groups
-    }
-    rooms: Values = {"room": {}} if "room" in groups else {}
-    plain = Case.from_namelist(names | rooms).to_namelist()
-    changed = {
-        group: {key: value for key, value in keys.items() if value != plain[group].get(key)}
-        for group, keys in groups.items()
-        if group not in {"case", *names}
-    }
-    return names | rooms | {group: keys for group, keys in changed.items() if keys}
-
-
-def input_case(name: str) -> Case:
-    """Return the case of an example input; the path of a file in it is absolute."""
+def _stated(name: str) -> Values:
+    """Return what an example input states of its source or floor; paths of files are absolute."""
     path = inputs_folder() / name
-    values = f90nml.read(path).todict()
+    values: Values = f90nml.read(path).todict()
     for keys in values.values():
         if "file" in keys:
-            keys["file"] = str(path.parent / keys["file"])
-    return Case.from_namelist(values)
+            keys["file"] = str(path.parent / str(keys["file"]))
+    return {
+        group: keys for group, keys in values.items() if group not in {"model", "floor", "room"}
+    }
 
 
 MODEL_FACTS = {
@@ -129,7 +108,7 @@ MODEL_FACTS = {
         "Tyre: belt and rim",
         "The tyre of the bang machine: a belt on its contact patch and a rim above it",
         "Carcass and damping are chosen so that the tyre conforms: it shows effects of parts.",
-        partial(input_case, "tyre.nml"),
+        "tyre.nml",
         _BALL,
         ("belt_mass", "belt_frequency", "carcass_stiffness", "contact_damping", "mass"),
         ("carcass_stiffness", "contact_damping"),
@@ -139,14 +118,14 @@ MODEL_FACTS = {
         "A ball whose natural frequencies on the floor were measured",
         "The force on a rigid floor, which a room below takes as it is; frequencies, damping and "
         "masses determine it.",
-        partial(input_case, "measured_modes.nml"),
+        "measured_modes.nml",
         (*_BALL, "substeps"),
     ),
     "hunt_crossley": Facts(
         "One mass on a spring",
         "The simplest source, by contact time and restitution (Hunt and Crossley)",
         "A baseline: contact time and restitution do not determine the levels.",
-        partial(input_case, "tyre_one_mass.nml"),
+        "tyre_one_mass.nml",
         _BALL,
         ("contact_time", "restitution", "exponent", "mass"),
         ("contact_time", "restitution"),
@@ -190,13 +169,13 @@ FLOOR_FACTS = {
         "Measured mobility",
         "A floor whose mobility under the source was measured and fitted",
         "Frequencies of the measurement only.",
-        partial(input_case, "floors/measured_slab.nml"),
+        "floors/measured_slab.nml",
     ),
     "modal_floor": Facts(
         "Modes of a file",
         "A floor whose modes another program has computed",
         "Frequencies of the modes in the file only.",
-        partial(input_case, "floors/modal_slab.nml"),
+        "floors/modal_slab.nml",
     ),
 }
 
