@@ -24,7 +24,7 @@ def test_section_of_a_ball_is_flattened_and_returns(name: str, *, is_computed: b
         return
     assert motion["is_computed"] is is_computed
     outer, inner = np.array(motion["outer"]), np.array(motion["inner"])
-    assert outer.shape == inner.shape == (len(motion["time"]), 33, 2)
+    assert outer.shape == inner.shape == (len(motion["time"]), 25, 2)
     assert len(motion["time"]) > 15
     assert motion["time"][0] == 0
     # The radius and the wall of the standard ball, mm, before the impact and on the floor.

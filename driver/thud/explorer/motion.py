@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     Answer = dict[str, Any]
 
 # Maximum number of instants of a motion, and of points of a line.
-MAX_INSTANTS = 30
-MAX_POINTS = 33
+MAX_INSTANTS = 20
+MAX_POINTS = 25
 # Decimals of positions, mm.
 DECIMALS = 1
 
