@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import errno
 import os
-import re
 import resource
 import signal
 import subprocess
@@ -74,7 +73,7 @@ def test_ended_study_goes_on_where_it_stopped(
     _, errors = process.communicate()
     if end == signal.SIGINT:
         assert process.returncode == 130
-        assert re.search(naming("interrupted", "kept"), errors)
+        assert "interrupted" in errors
     else:
         assert process.returncode == -signal.SIGKILL
     assert not (tmp_path / "long.nc").exists()
@@ -232,7 +231,7 @@ def test_results_that_cannot_be_read_for_now_stay(
         raise OSError(number, os.strerror(number), "python.nc")
 
     with monkeypatch.context() as patch:
-        patch.setattr("thud.studies.dataset.read_input", fail)
+        patch.setattr("thud.studies.dataset.require_regular", fail)
         with pytest.raises(OSError, match=os.strerror(number)):
             thud.sweep(HEIGHTS, tmp_path, replace=True)
     assert (tmp_path / "python.nc").stat().st_ino == inode

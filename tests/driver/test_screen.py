@@ -14,7 +14,6 @@ import termios
 from collections import Counter
 from typing import TYPE_CHECKING
 
-import numpy as np
 import pytest
 from conftest import INPUTS, MINIMAL, REPOSITORY
 from hypothesis import given, strategies as st
@@ -38,34 +37,21 @@ MEANINGLESS = re.compile(r"(?<![\d.])(?:[-−]0(?:\.0+)?|0\.000+)(?![\d.])")
 # Names of commands with arguments; they are run in a directory with a copy of the inputs.
 COMMANDS = {
     "assess": "assess inputs/rubber_ball_modal.nml",
-    "assess unknowns": "assess inputs/rubber_ball_unknowns.nml",
-    "calibrate": "calibrate inputs/recordings/drop_1.csv --mass 2.5",
     "compare": "compare inputs/rubber_ball_100cm.nml inputs/recordings/drop_1.csv "
     "inputs/rubber_ball_fe.nml inputs/rubber_ball_fe_viscous.nml inputs/rubber_ball_modal.nml",
-    "constructions": "floor --list",
-    "design": "design --no-figures inputs/studies/design.toml",
-    "design of a floor": "design --no-figures inputs/studies/floor_design.toml",
-    "export": "export --wav inputs/rubber_ball_100cm.nml",
     "fit a force": "fit --no-figures inputs/studies/fit_force.toml",
-    "fit levels": "fit --no-figures inputs/studies/fit_levels.toml",
     "floor": "floor inputs/floors/concrete_140.nml inputs/floors/clt_200.nml "
     "inputs/floors/joists.nml inputs/floors/floating_soft.nml "
     "--construction 'CLT 160, gravel, screed on 10 MN/m3, ceiling'",
-    "help": "--help",
     "help of measure": "measure --help",
     "history": "history outputs/lab",
     "listen": "listen inputs/floors/concrete_140.nml inputs/floors/joists.nml",
     "measure": "measure --no-figures --config inputs/recordings/lab.toml -o outputs/lab "
     + " ".join(f"inputs/recordings/drop_{i}.wav" for i in range(1, 6)),
-    "measure without configuration": "measure inputs/recordings/drop_1.csv",
-    "mobility": "mobility --no-figures mobility.csv",
     "predict": "predict inputs/floors/concrete_180_ceiling.nml inputs/floors/joists.nml",
     "rate": "rate --no-figures inputs/floors/field_levels.csv --volume 50",
-    "sensitivity": "sensitivity --no-figures inputs/studies/sensitivity.toml",
-    "sensitivity of the tyre": "sensitivity --no-figures inputs/studies/tyre.toml",
+    "sensitivity": "sensitivity --no-figures inputs/studies/tyre.toml",
     "sweep": "sweep --no-figures inputs/studies/sweep.toml",
-    "uncertainty": "uncertainty --no-figures inputs/studies/uncertainty.toml",
-    "unknown command": "swep",
 }
 QUICK = ("assess", "predict", "rate")
 
@@ -103,17 +89,9 @@ def widest(printed: str) -> str:
 
 @pytest.fixture(scope="module")
 def workplace(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a directory with the inputs, a mobility and the report of a recording."""
+    """Return a directory with the inputs."""
     folder = tmp_path_factory.mktemp("workplace")
     shutil.copytree(REPOSITORY / "inputs", folder / "inputs")
-    frequency = np.geomspace(20, 800, 200)
-    omega = 2 * np.pi * frequency
-    parts = (1j * omega / (m * ((2 * np.pi * f) ** 2 * (1 + 0.05j) - omega**2)) for m, f in (
-        (500, 60), (700, 200), (600, 450),
-    ))  # fmt: skip
-    rows = zip(frequency, sum(parts) + 1e-9j * omega, strict=True)
-    text = "".join(f"{f:.6g},{y.real:.8g},{y.imag:.8g}\n" for f, y in rows)
-    (folder / "mobility.csv").write_text(f"frequency,real,imaginary\n{text}")
     return folder
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from thud import _core
 from thud.base.errors import InputError, NumericalError
-from thud.base.note import Note, library_name
+from thud.base.note import Note
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -81,10 +81,11 @@ def _collect(status: int, handle: int, n_byte: int, n_value: int) -> Bundle:
     if status:
         note = None
         if "group" in answer:
-            subject = ".".join(filter(None, (answer["group"], answer["key"])))
+            group, key = answer["group"], answer["key"]
             value, low, high, *is_open = answer.get("range", [math.nan] * 3 + [0.0] * 2)
-            others = {"name": library_name(subject), "text": answer["problem"]}
+            others = {"name": f"&{group}: {key}".rstrip(), "text": answer["problem"]}
             others |= dict(zip(("low_open", "high_open"), is_open, strict=True))
+            subject = f"{group}.{key}".rstrip(".")
             note = Note("refused", subject, value, low, high, others=others)
         raise _ERRORS.get(status, NumericalError)(answer["message"], note)
     return answer
@@ -100,10 +101,12 @@ def notes(group: Mapping[str, Any]) -> tuple[Note, ...]:
         [math.nan if math.isnan(value) else float(value) for value in group[name]]
         for name in ("value", "low", "high")
     )
-    return tuple(
-        Note(code, subject, value, low, high, others={"name": library_name(subject), "text": text})
-        for code, subject, text, value, low, high in zip(*words, *numbers, strict=True)
-    )
+    result = []
+    for code, subject, text, value, low, high in zip(*words, *numbers, strict=True):
+        name, _, key = subject.partition(".")
+        others = {"name": f"&{name}: {key}".rstrip(), "text": text}
+        result.append(Note(code, subject, value, low, high, others=others))
+    return tuple(result)
 
 
 def without_units(columns: Mapping[str, Any]) -> dict[str, Any]:

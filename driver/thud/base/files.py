@@ -127,16 +127,11 @@ def is_failure(error: BaseException) -> bool:
     return isinstance(error, OSError) and error.errno not in (None, *_NO_FILE)
 
 
-def read_input(path: Path) -> bytes:
-    """Return the content of an input file; raise OSError if it is not a regular file."""
-    require_regular(path)
-    return path.read_bytes()
-
-
-def require_regular(path: Path) -> None:
-    """Raise OSError if a file is missing or is not a regular one: opening others may block."""
+def require_regular(path: Path) -> Path:
+    """Return a path; raise OSError if it is no regular file: opening others may block."""
     if not stat.S_ISREG(path.stat().st_mode):
         raise OSError(errno.EINVAL, f"{path.name} is no regular file", str(path))
+    return path
 
 
 def regular_file(path: str | os.PathLike[str]) -> Path:

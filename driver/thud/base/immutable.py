@@ -39,7 +39,8 @@ def freeze(array: NDArray[Any]) -> NDArray[Any]:
 
 def _read_only(value: Any) -> Any:  # noqa: ANN401 - values of any kind
     if isinstance(value, np.ndarray) and value.flags.writeable:
-        return freeze(value.copy())
+        value = value.copy()
+        value.setflags(write=False)
     if type(value) in {list, tuple}:
         return tuple(map(_read_only, value))
     if type(value) is dict:

@@ -10,7 +10,7 @@ import numpy as np
 
 from thud.base.checks import refuse
 from thud.base.errors import ThudError
-from thud.base.files import read_input
+from thud.base.files import require_regular
 from thud.case.case import Case
 from thud.impact.compute import new_impact
 
@@ -60,7 +60,7 @@ def read_results(directory: str | os.PathLike[str]) -> Impact:
 
 
 def _text(path: Path) -> str:
-    return read_input(path).decode()
+    return require_regular(path).read_bytes().decode()
 
 
 def _warnings(group: Mapping[str, Any]) -> dict[str, str | NDArray[np.float64]]:

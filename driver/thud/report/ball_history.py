@@ -16,7 +16,7 @@ from scipy.special import stdtrit
 
 from thud.base._schema import VERDICTS
 from thud.base.checks import refuse
-from thud.base.files import read_input
+from thud.base.files import require_regular
 from thud.base.immutable import Immutable
 from thud.recordings.words import read_date
 from thud.report.contents import FORMAT
@@ -304,7 +304,7 @@ def _read(path: Path) -> tuple[datetime, dict[str, Any]]:
     try:
         if path.stat().st_size > MAX_SIZE:
             refuse(f"{path}: is larger than {MAX_SIZE >> 20} MiB", allowed)
-        report = json.loads(read_input(path))
+        report = json.loads(require_regular(path).read_bytes())
     except (OSError, ValueError, RecursionError) as error:
         reason = error.strerror if isinstance(error, OSError) else "no JSON"
         refuse(f"{path}: cannot be read ({reason})", allowed, error)

@@ -13,7 +13,7 @@ from thud.base.bridge import version
 from thud.base.checks import refuse, require_kind, shown_text
 from thud.base.display import draw_all, warn_if_not_drawn
 from thud.base.errors import ReportWarning
-from thud.base.files import Results, read_input
+from thud.base.files import Results, require_regular
 from thud.base.tables import csv_text
 from thud.recordings.recording import Recording
 from thud.report.contents import FORMAT, json_bytes, report_data
@@ -210,7 +210,7 @@ def read_picture(path: Path) -> tuple[str, bytes]:
 def _checksums_in(folder: Path) -> list[str] | None:
     """Return the checksums of the files of an earlier report; None if there is none."""
     try:
-        data = json.loads(read_input(folder / JSON))
+        data = json.loads(require_regular(folder / JSON).read_bytes())
         return [file["sha256"] for file in data["files"]] if data["format"] == FORMAT else None
     except (OSError, ValueError, RecursionError, KeyError, TypeError):
         return None

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-from hashlib import sha256
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
 from thud.base.checks import refuse
-from thud.base.files import is_failure, read_input, replace_file
+from thud.base.files import is_failure, replace_file, require_regular
 from thud.case.case import case_text
 from thud.impact.datasets import FREQUENCIES, RESULTS, attributes, case_attributes, sample_variables
 from thud.studies.sampling import sampler_versions
@@ -115,9 +114,8 @@ def _objects(values: NDArray[Any]) -> NDArray[Any]:
 
 
 def write_dataset(dataset: xr.Dataset, path: Path) -> None:
-    """Write a NetCDF file atomically, with a checksum after its end, which other readers ignore."""
-    content = bytes(dataset.to_netcdf(engine="h5netcdf"))
-    replace_file(path, content + sha256(content).digest())
+    """Write a NetCDF file atomically."""
+    replace_file(path, bytes(dataset.to_netcdf(engine="h5netcdf")))
 
 
 def read_dataset(path: Path) -> xr.Dataset:
@@ -127,17 +125,16 @@ def read_dataset(path: Path) -> xr.Dataset:
         if not blocks:
             refuse(f"{path} holds no finished samples", "results of a study")
         return concatenate([read_dataset(block) for block in blocks])
-    content = b""
     try:
-        content = read_input(path)
-    except (OSError, ValueError) as error:
+        content = BytesIO(require_regular(path).read_bytes())
+        with xr.open_dataset(content, engine="h5netcdf") as file:
+            dataset = file.load()
+    except (OSError, ValueError, KeyError, RuntimeError) as error:
         if is_failure(error):
             raise
-    end = len(content) - sha256().digest_size
-    if sha256(content[:end]).digest() != content[end:]:
-        refuse(f"{path} cannot be read", "the .nc or .partial of a study; remove a damaged one")
-    with xr.open_dataset(BytesIO(content), engine="h5netcdf") as file:
-        dataset = file.load()
+        refuse(
+            f"{path} cannot be read", "the .nc or .partial of a study; remove a damaged one", error
+        )
     variables = dataset.variables.items()
     texts: dict[Any, Any] = {n: v.astype(object) for n, v in variables if v.dtype.kind == "U"}
     return dataset.assign(texts).drop_encoding()
