@@ -195,12 +195,8 @@ class Case(Immutable):
                 kinds[group] = choices[name]
         attributes: dict[str, Any] = {"model": None, **content.get("case", {})}
         for attribute, kind in kinds.items():
-            values = {
-                key.name: content[key.group][key.name]
-                for key in kind.keys.values()
-                if key.name in content.get(key.group, {})
-            }
-            attributes[attribute] = kind(**values)
+            keys = [key for key in kind.keys.values() if key.name in content.get(key.group, {})]
+            attributes[attribute] = kind(**{k.name: content[k.group][k.name] for k in keys})
         return cls(**attributes)
 
 

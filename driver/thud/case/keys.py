@@ -19,9 +19,6 @@ if TYPE_CHECKING:
 
 Value = float | int | str | bool
 
-# Group of keys that select the files of a run; they have no effect on results.
-OUTPUT_GROUP = "output"
-
 # Spelling of names of persons and abbreviations by their form in keys.
 _PROPER = {
     "youngs": "Young's",
@@ -51,7 +48,6 @@ def known_keys(case: Case) -> dict[str, Key]:
         key.name: key
         for key in (*KEYS, DENSITY, TEMPERATURE)
         if key.owner == model or (not key.owner and key.group in GROUPS)
-        if key.group != OUTPUT_GROUP
     }
     below = {case.floor.name if case.floor else "", "room" if case.room else ""}
     for key in KEYS:

@@ -20,7 +20,7 @@ from thud.base.checks import refuse, refuse_value, require_kind
 from thud.base.extras import data_frame, require_extra
 from thud.base.note import Note
 from thud.case.case import Case, impact_only
-from thud.case.keys import OUTPUT_GROUP, value_in, with_values
+from thud.case.keys import value_in, with_values
 from thud.impact.datasets import FREQUENCIES, LEVELS, RESULTS
 from thud.studies.dataset import read_dataset
 from thud.studies.study_result import SampleResult
@@ -362,7 +362,7 @@ def differing_keys(before: Case, now: Case) -> list[tuple[str, str, str]]:
         {
             f"&{group}: {key}": f"{value!r}"
             for group, keys in impact_only(case).resolved().to_namelist().items()
-            if group not in {"case", "limits", OUTPUT_GROUP}
+            if group not in {"case", "limits"}
             for key, value in keys.items()
         }
         for case in (before, now)
