@@ -127,7 +127,7 @@ SYSTEMS = {None: (1.0, 1.0), 1: (1.0, 1.0), 7: (39.37007874, 0.224808943)}
 INCH, POUND = 0.0254, 4.4482216
 FORCES = {"NONE": 0.0, "N": 1.0, "kN": 1e3, "lbf": POUND, "V": None}
 RESPONSES: dict[int, dict[str, float | None]] = {
-    8: {"NONE": 0.0, "m": 1.0, "mm": 1e-3, "in": INCH, "m/s": None, "mil": None},
+    8: {"NONE": 0.0, "m": 1.0, "mm": 1e-3, "in": None, "m/s": None, "mil": None},
     11: {"NONE": 0.0, "m/s": 1.0, "mm/s": 1e-3, "(in/s)": INCH, "m": None, "m/s^2": None},
     12: {"NONE": 0.0, "m/s^2": 1.0, "mm/s**2": 1e-3, "m/s/s": 1.0, "g": 9.80665,
          "in/s2": INCH, "m/s": None, "V": None, "dB": None},

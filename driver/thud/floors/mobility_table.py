@@ -11,7 +11,7 @@ import numpy as np
 
 from thud.base.checks import refuse, require_choice, shown
 from thud.base.errors import InputError
-from thud.base.units import size_of
+from thud.base.units import factor_to, size_of
 from thud.floors.mobility import Mobility
 from thud.recordings.formats import guarded
 from thud.recordings.formats.text import read_table
@@ -30,12 +30,6 @@ _POWERS = {"mobility": 0, "accelerance": -1, "receptance": 1}
 # Quantity by the data type of a response in universal files: displacement, velocity, acceleration.
 _RESPONSES = {8: "receptance", 11: "mobility", 12: "accelerance"}
 _FREQUENCY_RESPONSE = 4
-# Unit of a response in a universal file, also per force; g is the standard acceleration of gravity.
-_LENGTHS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "um": 1e-6, "in": 0.0254, "ft": 0.3048, "g": 9.80665}
-_RESPONSE_UNIT = re.compile(
-    rf"(?P<length>{'|'.join(_LENGTHS)})(?P<time>/s2|/s/s|/s)?(?:/(?P<force>[A-Za-z]+))?"
-)
-_RESPONSE_UNITS = {0: "m, mm, in", 1: "m/s, mm/s, in/s", 2: "m/s2, mm/s2, in/s2, g"}
 _ALLOWED = (
     "a table with the columns frequency, Hz, real and imaginary, or magnitude and phase, degrees; "
     "or a universal file with one frequency response, data set 58"
@@ -51,8 +45,9 @@ _TITLES = {
     "周波数": "frequency", "実部": "real", "実数部": "real", "虚部": "imaginary",
     "虚数部": "imaginary", "振幅": "magnitude", "絶対値": "magnitude", "位相": "phase",
 }  # fmt: skip
-# SI unit of the values by quantity, and of further columns by kind.
+# SI units of the values and of the response by quantity, and of further columns by kind.
 _UNITS = {"mobility": "m/(Ns)", "accelerance": "m/(Ns2)", "receptance": "m/N"}
+_RESPONSE_UNITS = {"mobility": "m/s", "accelerance": "m/s2", "receptance": "m"}
 _FURTHER_UNITS = {"frequency": "Hz", "phase": "deg"}
 
 
@@ -151,29 +146,25 @@ def _read_universal(path: Path) -> tuple[Array, NDArray[np.complex128], Quantity
     sign = 1 if record["rsp_dir"] * record["ref_dir"] >= 0 else -1
     quantity: Quantity = _RESPONSES[response]  # type: ignore[assignment]
     values = np.asarray(record["data"], dtype=complex)
-    values *= sign * _si_units(data_set, 1 - _POWERS[quantity], path)
+    values *= sign * _si_units(data_set, quantity, path)
     return np.asarray(record["x"], dtype=float), values, quantity
 
 
-def _si_units(data_set: DataSet, seconds: int, path: Path) -> float:
-    """Return the unit of a response per force in SI units, m s^-n/N, n = `seconds`.
+def _si_units(data_set: DataSet, quantity: Quantity, path: Path) -> float:
+    """Return the unit of a response per force in SI units.
 
     The labels state it, or data set 164. Raise InputError if they do not agree, or a label is no
     such unit.
     """
-    above, below = (data_set.label(f"{field}_axis_units_lab") for field in ("ordinate", "orddenom"))
-    plain = re.sub(r"[\s^*().]", "", unicodedata.normalize("NFKC", above))
-    match = _RESPONSE_UNIT.fullmatch(plain)
-    power = {None: 2 if plain.startswith("g") else 0, "/s": 1, "/s2": 2, "/s/s": 2}
-    if above and (not match or power[match["time"]] != seconds):
-        refuse(f"{path}: the response has the unit {shown(above)}", _RESPONSE_UNITS[seconds])
-    length = _LENGTHS[match["length"]] if match else None
-    ratio = match["force"] if match else None
-    forces = {size_of(text) for text in (below, ratio) if text}
-    if len(forces) > 1 or any(base != "N" for base, _ in forces):
-        refuse(f"{path}: the force has the unit {shown(below or ratio)}", "N, kN, lbf")
-    force = next((size for _, size in forces), None)
-    pairs = ((length if power[None] == 0 else None, data_set.length), (force, data_set.force))
+    above, below = (
+        data_set.label(f"{field}_axis_units_lab").strip("() ") for field in ("ordinate", "orddenom")
+    )
+    if size_of(above)[0] == _UNITS[quantity]:
+        return size_of(above)[1]
+    length = factor_to(_RESPONSE_UNITS[quantity], above, f"{path}: response") if above else None
+    force = factor_to("N", below, f"{path}: force") if below else None
+    # The standard acceleration of gravity is no unit of length.
+    pairs = ((length if above != "g" else None, data_set.length), (force, data_set.force))
     for stated, system in pairs:
         if stated and system and abs(stated / system - 1) > SAME_UNIT:
             refuse(
