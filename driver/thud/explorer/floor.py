@@ -16,6 +16,7 @@ from thud.floors.description import (
     CAVEAT,
     CONTRIBUTIONS,
     case_layers,
+    chance,
     rating_title,
     source_note,
     verdict_text,
@@ -91,16 +92,16 @@ def room_answer(prediction: RoomPrediction) -> Answer:
         getattr(room, side) or getattr(floor, side, 0.0) for side in ("length", "width")
     )
     height = prediction.volume / (length * width) if length and width else 0.0
-    required, rating = prediction.requirement, prediction.rating
+    rating = prediction.rating
     details = (
         rating_title(prediction, rating.name), verdict_text(prediction),
         class_text(prediction.korean_class), source_note(prediction), CAVEAT,
     )  # fmt: skip
     return {
-        "result": RESULTS[required.verdict] if required else "level",
+        "result": RESULTS[prediction.verdict] if prediction.verdict else "level",
         "rounded": rating.rounded,
         "uncertainty_of_rating": rating.uncertainty,
-        "chance": required.chance if required else "",
+        "chance": chance(prediction),
         "detail": "; ".join(filter(None, details)),
         "frequency": to_json(prediction.frequency),
         "level": to_json(prediction.level),

@@ -106,13 +106,12 @@ def _improved(case: Case, name: str) -> list[Answer]:
 def _reached(case: Case) -> dict[str, float]:
     """Return level, standard uncertainty and probability where a requirement is met, else none."""
     with suppress(ThudError):
-        required = predict_level(compute(case)).requirement
-        if required and required.verdict == VERDICTS[0]:
-            rating = required.rating
+        prediction = predict_level(compute(case))
+        if prediction.verdict == VERDICTS[0]:
             return {
-                "level": rating.rounded,
-                "uncertainty": rating.uncertainty,
-                "probability": required.probability,
+                "level": prediction.rating.rounded,
+                "uncertainty": prediction.rating.uncertainty,
+                "probability": prediction.probability,
             }
     return {}
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from thud.base._schema import (
     RATINGS,
+    VERDICTS,
     JoistFloor,
     LaminateFloor,
     MeasuredMobility,
@@ -60,9 +61,15 @@ def source_note(prediction: RoomPrediction) -> str:
     return "the source does not conform" if prediction.source_notes else ""
 
 
+def chance(prediction: RoomPrediction) -> str:
+    """Return limit and probability of a requirement: "meets 49 dB with 31 %"; else nothing."""
+    limit = prediction.room.required
+    return f"meets {limit:g} dB with {100 * prediction.probability:.0f} %" if limit else ""
+
+
 def rating_text(prediction: RoomPrediction) -> str:
     """Return the rating, the probability to meet a requirement, and the note on the source."""
-    words = str(prediction.requirement or prediction.rating)
+    words = "; ".join(filter(None, (str(prediction.rating), chance(prediction))))
     return ", ".join(filter(None, (words, source_note(prediction))))
 
 
@@ -73,11 +80,10 @@ def remedy(prediction: RoomPrediction) -> str:
 
 def verdict_text(prediction: RoomPrediction) -> str:
     """Return probability and verdict on a requirement, and what would decide it; else nothing."""
-    required = prediction.requirement
-    if required is None:
+    if not prediction.verdict:
         return ""
-    text = f"{required.chance}: {required.verdict}"
-    if required.verdict != "undecided":
+    text = f"{chance(prediction)}: {prediction.verdict}"
+    if prediction.verdict != VERDICTS[2]:
         return text
     return f"{text}; {source_note(prediction) or f'to decide it: {remedy(prediction)}'}"
 

@@ -67,7 +67,7 @@ class FloorComparison(Tabulated):
             }
         octaves = np.transpose([prediction.octave_level for prediction in predictions])
         tapping = [_tapping(prediction) for prediction in predictions]
-        required = [prediction.requirement for prediction in predictions]
+        required = [p.room.required for p in predictions]
         return {
             "name": ([*self.predictions], ""),
             "floor": ([p.floor.name.replace("_", " ") for p in predictions], ""),
@@ -75,10 +75,10 @@ class FloorComparison(Tabulated):
             "source": ([_source(p) for p in predictions], ""),
             **ratings,
             "class (KS F 2863-2)": ([class_text(p.korean_class) for p in predictions], ""),
-            "required, dB": ([r.limit if r else np.nan for r in required], "g"),
-            "required rating": ([r.rating.name if r else "" for r in required], ""),
-            "verdict": ([r.verdict if r else "" for r in required], ""),
-            "probability, %": ([100 * r.probability if r else np.nan for r in required], ".0f"),
+            "required, dB": ([limit or np.nan for limit in required], "g"),
+            "required rating": ([p.room.rating if p.verdict else "" for p in predictions], ""),
+            "verdict": ([p.verdict for p in predictions], ""),
+            "probability, %": ([100 * p.probability for p in predictions], ".0f"),
             **{
                 f"{frequency:g} Hz octave, dB": (levels, ".1f")
                 for frequency, levels in zip(RATED_BANDS["octave"], octaves, strict=True)

@@ -23,13 +23,7 @@ from thud.impact.floor_impact import FloorImpact
 from thud.impact.room_level import RoomLevel
 from thud.level.assessment import ImpactOrRecording, criterion_quantity
 from thud.level.levels import BANDWIDTHS, SOURCES
-from thud.level.rating import (
-    PredictedRating,
-    Requirement,
-    class_of,
-    rating,
-    standardized_level,
-)
+from thud.level.rating import PredictedRating, class_of, rating, standardized_level
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -68,7 +62,7 @@ class RoomPrediction(RoomLevel, Tabulated):
         Change of the peak force by the floor, dB. If the force is blocked: the change for a linear
         source with the mass and the contact time of the impact.
     source_notes : tuple of Note
-        Warning on a source that does not conform to the standards.
+        Warning on a source that does not conform to the standards; the verdict is undecided.
     """
 
     floor: FloorOptions
@@ -115,14 +109,6 @@ class RoomPrediction(RoomLevel, Tabulated):
         paths = 10 * np.log10(np.maximum(self.path_shares, 1e-30)).T
         levels = np.array([rating(self.level + path, BANDS).a_weighted for path in paths])
         return np.asarray(10 ** ((levels - self.ratings["thirds"].level) / 10))
-
-    @property
-    def requirement(self) -> Requirement | None:
-        """Verdict on the requirement of the room (its key `required`); None without one."""
-        if not self.room.required:
-            return None
-        verdict = VERDICTS[-1] if self.source_notes else self.verdict
-        return Requirement(self.room.required, self.rating, self.probability, verdict)
 
     @property
     def standardized(self) -> Array:
@@ -239,6 +225,8 @@ def predict_level(
         change = 20 * math.log10(impact.peak_force / blocked)
     else:
         change = _force_change(source.mass, source.contact_time, 1 / level.conductance.max())
+    if (notes := _source_notes(source)) and room.required:
+        level = replace(level, verdict=VERDICTS[2])
     return RoomPrediction(
         **vars(level),
         floor=floor,
@@ -246,7 +234,7 @@ def predict_level(
         source=impact or source,
         force="contact" if impact else "blocked",
         force_change=change,
-        source_notes=_source_notes(source),
+        source_notes=notes,
     )
 
 

@@ -63,7 +63,8 @@ class RoomLevel(Immutable):
     probability : float
         Probability that the rating is at most the required one; NaN if the room requires none.
     verdict : str
-        Verdict on this requirement for a source that conforms; empty if the room requires none.
+        ``"conforms"`` to this requirement if the probability is at least 84 %, ``"does not
+        conform"`` if it is at most 16 %, else ``"undecided"``; empty if the room requires none.
     floor_notes : tuple of Note
         Warnings on conditions in which the model of the floor is not valid.
     """

@@ -111,38 +111,6 @@ class PredictedRating:
         return f"{self.rounded} dB, standard uncertainty {self.uncertainty:.1f} dB"
 
 
-@dataclass(frozen=True)
-class Requirement:
-    """Requirement on a predicted rating, and the verdict on it.
-
-    Attributes
-    ----------
-    limit : float
-        Maximum rating, rounded, dB.
-    rating : PredictedRating
-        The rating.
-    probability : float
-        Probability that the requirement is met.
-    verdict : str
-        ``"conforms"`` if the probability is at least 84 %, ``"does not conform"`` if it is at most
-        16 %, else, or if the source does not conform to the standards, ``"undecided"``.
-    """
-
-    limit: float
-    rating: PredictedRating
-    probability: float
-    verdict: str
-
-    @property
-    def chance(self) -> str:
-        """Limit and probability, such as ``"meets 49 dB with 31 %"``."""
-        return f"meets {self.limit:g} dB with {100 * self.probability:.0f} %"
-
-    def __str__(self) -> str:
-        """Return rating, limit and probability."""
-        return f"{self.rating}; {self.chance}"
-
-
 def excess_level(limit: float) -> float:
     """Return the lowest level that, rounded, exceeds a limit.
 

@@ -29,13 +29,13 @@ _TABLES = ("bands", "octaves", "ratings", "contributions", "paths", "modes", "ch
 
 def screen_text(floor: PredictedFloor) -> str:
     """Return the ratings of a floor, and what makes them uncertain, as lines."""
-    prediction, required = floor.prediction, floor.prediction.requirement
+    prediction, verdict = floor.prediction, floor.prediction.verdict
     (title, _, _, text), *others = floor.ratings
     octaves = zip(RATED_BANDS["octave"], prediction.octave_level, strict=True)
     lines = [
         floor.name,
         f"  {title}: {', '.join(filter(None, (text, source_note(prediction))))}",
-        *([f"  {verdict_text(prediction)}"] if required else []),
+        *([f"  {verdict_text(prediction)}"] if verdict else []),
         f"  {CAVEAT.capitalize()}",
         *(f"    {title}: {text}" for title, _, _, text in others),
         f"    Octaves: {', '.join(f'{level:.1f} dB at {f:g} Hz' for f, level in octaves)}",

@@ -254,10 +254,10 @@ def _tables(
     floor: PredictedFloor, *, changes: bool
 ) -> dict[str, tuple[Sequence[str], Iterable[Iterable[str | float]]]]:
     """Return titles and rows of each table of a floor."""
-    prediction, required = floor.prediction, floor.prediction.requirement
+    prediction, limit = floor.prediction, floor.prediction.room.required
     columns, bands = floor.columns(), prediction.frequency.tolist()
     by_modes = [float(i < prediction.n_modal) for i in range(len(bands))]
-    texts = [("required", required.limit, "", verdict_text(prediction))] if required else []
+    texts = [("required", limit, "", verdict_text(prediction))] if limit else []
     shares = zip([*bands, "A"], [*prediction.path_shares, prediction.weighted_shares], strict=True)
     deviation = "standard uncertainty, dB"
     changed: list[Change] = [*floor.changes] if changes else []
