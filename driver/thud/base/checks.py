@@ -31,7 +31,6 @@ def refuse(  # noqa: PLR0913 - the fields of a note
     allowed: str,
     cause: Exception | None = None,
     *,
-    error: type[InputError] = InputError,
     name: str = "",
     subject: str = "",
     value: object = None,
