@@ -29,7 +29,7 @@ export function changeText({ key, value, factor, ...reached }, values) {
   const percent = signed(100 * (factor - 1), "%");
   const start = shownValue(key, keyValue(values, key));
   const text = `${findField(...key.split(".")).label} ${shownValue(key, value)} instead of ${start} `;
-  return `${text}(${percent} %)${"level" in reached ? `: ${levelText(reached)}` : ""}`;
+  return `${text}(${percent}\u00a0%)${"level" in reached ? `: ${levelText(reached)}` : ""}`;
 }
 
 /** Return why there is no change, and constructions that meet a requirement. */
@@ -49,9 +49,9 @@ export function fitText({ file, intervals, values, residual: [size, part], is_ex
     const range = low === null || high === null ? "not determined" : `${low} to ${high}`;
     return `${label.replace(/^[A-Z](?!\w*')/, (letter) => letter.toLowerCase())} ${best} (${range}) ${unit}`;
   });
-  return `Fitted to ${file}: ${texts.map((text) => text.trim()).join(", ")} (95 %). The model `
+  return `Fitted to ${file}: ${texts.map((text) => text.trim()).join(", ")} (95\u00a0%). The model `
     + `${fits ? "explains" : "does not explain"} the data; the largest residual is `
-    + `${rounded(size, "N")}, ${(100 * part).toPrecision(2)} % of the largest force. `
+    + `${rounded(size, "N")}, ${(100 * part).toPrecision(2)}\u00a0% of the largest force. `
     + "The verdict is that of the best values, not of their intervals.";
 }
 
