@@ -125,13 +125,6 @@ class FloorImpact(Impact):
         )  # fmt: skip
         return np.asarray(answer["velocity"])
 
-    @property
-    def point_velocity(self) -> NDArray[np.float64]:
-        """Velocities at ``point_x`` and ``point_y`` of the floor, m/s, (n_point, n_sample)."""
-        points = zip(*(getattr(self.floor, f"point_{axis}", ()) for axis in "xy"), strict=True)
-        velocities = [self.velocity_at(x, y) for x, y in points]
-        return np.array(velocities).reshape(-1, len(self.time))
-
     def rows(self) -> list[tuple[str, ...]]:
         """Return the header and a row of text for each octave."""
         energy = self.injected_energy()
@@ -146,11 +139,12 @@ class FloorImpact(Impact):
         )
 
     def histories(self) -> dict[str, NDArray[np.float64]]:
-        """Return the histories, also the force on a rigid floor and the motion of the floor."""
-        points = enumerate(self.point_velocity, 1)
+        """Return the histories, also of the blocked force, the floor and its stated points."""
+        points = zip(*(getattr(self.floor, f"point_{axis}", ()) for axis in "xy"), strict=True)
+        velocities = enumerate((self.velocity_at(x, y) for x, y in points), 1)
         return super().histories() | {
             "blocked_force_N": self.blocked_force,
             "floor_displacement_m": self.floor_displacement,
             "floor_velocity_m_per_s": self.floor_velocity,
-            **{f"point_{i}_velocity_m_per_s": velocity for i, velocity in points},
+            **{f"point_{i}_velocity_m_per_s": values for i, values in velocities},
         }
