@@ -12,7 +12,8 @@ from synthetic import cut_drops, make_recording, with_force
 
 import thud
 from thud.recordings.config import Config
-from thud.recordings.recording import Recording, measure_stages, read_recording
+from thud.recordings.measured_drop import measure_stages
+from thud.recordings.recording import Recording, read_recording
 from thud.recordings.signal import Signal
 from thud.studies.fit import read_fit_study, run_fit
 from thud.studies.fitting.force_target import ForceTarget

@@ -27,8 +27,8 @@ from thud.recordings.background import remove_background
 from thud.recordings.config import Config
 from thud.recordings.contact import find_contact
 from thud.recordings.drops import Section, find_drops
-from thud.recordings.measured_drop import Drop, measure_drop
-from thud.recordings.quantities import GRAVITY, drop_estimates, measure_rebound
+from thud.recordings.measured_drop import GRAVITY, Drop, measure_drop, measure_rebound
+from thud.recordings.quantities import drop_estimates
 from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.repair import repair
 from thud.recordings.signal import Signal

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from conftest import REPOSITORY, codes, naming, noted, python
 from recording_files import WRITERS, half_sine
-from scipy.ndimage import median_filter
 
 import thud
 from thud.base.errors import InputError
@@ -171,36 +170,6 @@ def test_equal_samples_of_steps_or_of_a_lower_rate_are_not_held(noise: float, re
     force = np.repeat(np.round(drop_force(48e3 / repeats, noise=noise)), repeats)
     (drop,) = measured(force, 48e3).drops
     assert "spikes" not in codes(drop.notes)
-
-
-def later(force: np.ndarray, share: float) -> np.ndarray:
-    """Return a force with a smaller one behind it."""
-    return np.concatenate([force, np.zeros(2 * len(force)), share * force])
-
-
-@pytest.mark.parametrize(
-    ("change", "present", "absent"),
-    [
-        (lambda f: median_filter(f, 25), "noise of the background ends", "clipped"),
-        (lambda f: np.repeat(f[::24], 24)[: len(f)], "samples at the contact are equal", "clipped"),
-        (lambda f: f / 150, "unit = 'kN'", "probably wrong"),
-        (np.maximum.accumulate, "does not return", "unit"),
-        (lambda f: np.minimum(f, 1200), "clipped", "equal"),
-        (lambda f: later(f, 0.2), "below 0.25 of the highest", "bounce"),
-        (lambda f: f + np.roll(f, 420), "--leave-out", "clipped"),
-    ],
-    ids=["median", "hold", "10 N", "peak hold", "clipped", "small drop", "two impacts"],
-)
-def test_messages_name_the_cause_and_the_mend(
-    change: Callable[[np.ndarray], np.ndarray], present: str, absent: str
-) -> None:
-    force = change(drop_force(25.6e3))
-    try:
-        said = " ".join(map(str, measured(force, 25.6e3).notes))
-    except InputError as error:
-        said = str(error)
-    assert present in said
-    assert absent not in said
 
 
 def test_inverted_load_cell_does_not_make_another_one_the_sum(tmp_path: Path) -> None:

@@ -405,20 +405,6 @@ def test_end_of_a_record_does_not_reach_its_begin_in_the_correction() -> None:
     np.testing.assert_allclose(found, held, atol=1e-3)
 
 
-def test_uncertain_resonance_makes_levels_uncertain() -> None:
-    plate = Plate(1600, 30, f0_uncertainty=0.01)
-    _, measured = through_plate(half_sine, 51200.0, plate)
-    right = correct_force(measured, 51200.0, Chain((plate,)))
-    wrong = correct_force(measured, 51200.0, Chain((Plate(1600 * 1.01, 30),)))
-    change = thud.force_exposure_levels(wrong, 51200.0, "third") - thud.force_exposure_levels(
-        right, 51200.0, "third"
-    )
-    # The effect of a whole standard uncertainty on the spectrum of the pulse.
-    drop = make_drop(rate=51200.0)
-    found = instrument_uncertainties([drop], Config(plate=plate), None, "third")["plate"]
-    np.testing.assert_allclose(found, np.abs(change), rtol=0.05)
-
-
 def test_resonance_near_the_bands_is_refused() -> None:
     with pytest.raises(thud.InputError, match=naming("plate", "900 Hz", "1001.2 Hz")):
         correct_force(np.ones(100), 25600.0, Chain((Plate(900, 30),)))

@@ -16,8 +16,9 @@ from thud.level.levels import force_exposure_levels
 from thud.recordings.config import Config
 from thud.recordings.contact import band_noise
 from thud.recordings.drops import Quantization, Section
-from thud.recordings.quantities import GRAVITY, drop_estimates
-from thud.recordings.recording import measure_stages, read_recording
+from thud.recordings.measured_drop import GRAVITY, measure_stages
+from thud.recordings.quantities import drop_estimates
+from thud.recordings.recording import read_recording
 from thud.recordings.repair import find_quantization
 from thud.recordings.signal import Signal
 

@@ -8,7 +8,6 @@ import pickle
 import re
 import struct
 import time
-import tomllib
 import tracemalloc
 import zlib
 from dataclasses import fields
@@ -347,10 +346,8 @@ def test_headers_of_loggers(head: str, row: str, coding: str, end: str, tmp_path
     [
         ("fs: 8000\nNo;Force [N]\n", "{i};{v:g}", 8000.0),  # numbers of samples are no times
         ("fs: 8000\nGain;1,0\nNo;Force [N]\n", "{i};{v:g}", 8000.0),
-        ("fs: 8000\nGain;10\nNo;Force [N]\n", "{i};{v:g}", None),
         ("fs: 8000\nOffset;0;0.5\nNo;Force [N]\n", "{i};{v:g}", None),
         ("fs: 8000\nSensitivity = 4.1 mV/N\nForce\n", "{v:g}", None),
-        ("fs: 8000\nSensitivity = 4.1 mV/N\nForce [N]\n", "{v:g}", 8000.0),
         ("fs: 8000\nCalibration: 2026-05-06\nForce [N]\n", "{v:g}", 8000.0),
     ],
 )
@@ -830,26 +827,6 @@ def test_missing_packages_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPat
 
 
 # --- the examples
-
-
-def test_examples_hold_their_truth() -> None:
-    """Peaks of the recorded force are those of the truth but for plate, hum, drift and noise."""
-    folder = REPOSITORY / "inputs/recordings"
-    config = read_config(folder / "lab.toml")
-    truth = tomllib.loads((folder / "truth.toml").read_text())
-    assert len(truth["drop"]) == 8
-    for drop in truth["drop"]:
-        (signal,) = opened(
-            folder / drop["file"], calibration=config.calibration, polarity=config.polarity
-        )
-        for one in [drop, *drop.get("bounces", [])]:
-            begin = round(one["onset"] * signal.sample_rate)
-            # The plate rings on after the contact, to 1 % in Q ln(100) / (pi f0) = 33 ms.
-            end = round((one["onset"] + one["contact_time"] + 0.033) * signal.sample_rate)
-            force = signal.read(begin - 200, end) - signal.read(begin - 1200, begin - 200).mean()
-            assert abs(force[:190]).max() < 20
-            # Hum of 3 N and drift of 1 N over the contact.
-            assert force[200:].sum() / signal.sample_rate == pytest.approx(one["impulse"], abs=0.2)
 
 
 def test_tables_of_the_examples_are_those_of_the_sounds() -> None:

@@ -94,7 +94,13 @@ def write_tdms(path: Path, values: NDArray[np.float64], entries: list[Entry]) ->
         file.write_segment([*objects, nptdms.ChannelObject("plate", "force", values, own)])
 
 
+def write_text(path: Path, values: NDArray[np.float64], entries: list[Entry]) -> None:
+    header = "".join(f"{key}: {value}\n" for _, key, value in entries)
+    np.savetxt(path, values, "%.12g", header=f"{header}Force", comments="")
+
+
 FORMATS: dict[str, Callable[..., None]] = {
+    "t.csv": write_text,
     "a.h5": write_hdf5,
     "a.nc": write_hdf5,
     "5.mat": write_matlab,

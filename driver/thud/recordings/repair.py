@@ -3,7 +3,7 @@
 Each check states what it protects from, and how far levels are off without it: those of a half-sine
 of 1500 N and 20 ms. `repair` calls those of the force, and `measure_drop` `check_aliasing`, after
 the removal of the background. Checks of more or less than a drop are called where that is read or
-averaged: `thud.recordings.signal.check_peak` of a signal (kN in place of N: 60 dB), `copies.check`
+averaged: `thud.recordings.signal.orient` of a signal (kN in place of N: 60 dB), `copies.check`
 and `outliers.check` of several drops, and `plate.check_plate` (a resonance of 1.6 kHz that is not
 corrected: 1.9 dB at 708 Hz). Errors by quantization: docs/recordings_theory.md, section 2.
 """

@@ -207,41 +207,30 @@ def orient(signal: Signal, polarity: str | None = None) -> Signal:
         notes.append(Note("sign_changed", signal.name, -down, unit="N"))
         cells = tuple(replace(cell, scale=-cell.scale) for cell in signal.cells)
         signal, up, down = replace(signal, scale=-signal.scale, cells=cells), down, up
-    is_assumed = any(note.code == "unit_assumed" for note in signal.notes)
-    notes += check_peak(up, down, signal.name, assumed=is_assumed)
+    name, (low, high) = signal.name, PEAKS
+    if not low <= up <= high:
+        allowed = f"{low:g} to {high:g} N for heavy/soft sources"
+        if any(note.code == "unit_assumed" for note in signal.notes):
+            unknown = f"{name}: the values are without a unit and reach {up:.4g}"
+            refuse(unknown, f"{allowed}, or unit")
+        if low <= down <= high:
+            cause = "the polarity is wrong, or the force does not return from its peak"
+            refuse(f"{name}: the peaks are {-down:.4g} N and {up:.4g} N; {cause}", allowed)
+        if not low / MAX_FACTOR <= up <= high * MAX_FACTOR:
+            fitting = [unit for unit, size in WRONG_UNITS.items() if low <= up * size <= high]
+            mends = [f"unit = {unit!r}" for unit in fitting] + ["a calibration"]
+            problem = f"{name}: the peak is {up:.4g} N; unit or calibration is wrong"
+            refuse(problem, f"{allowed}; {', or '.join(mends)}")
+        notes.append(Note("peak_unusual", name, up, low, high, "N"))
+    if down > MIN_PEAK_RATIO * up:
+        others: dict[str, float | str] = {"opposite": -down}
+        notes.append(Note("polarity_doubtful", name, up, unit="N", others=others))
     for cell in signal.cells:
         above, below = find_peaks(cell)
         if below > max(MIN_PEAK_RATIO * above, MIN_OPPOSITE * up):
-            others: dict[str, float | str] = {"part": cell.name, "total": up}
+            others = {"part": cell.name, "total": up}
             notes.append(Note("cell_sign", value=-below, unit="N", others=others))
     return replace(signal, notes=(*signal.notes, *notes))
-
-
-def check_peak(peak: float, opposite: float, name: str, *, assumed: bool = False) -> list[Note]:
-    """Return warnings about a peak force, N, and that of the opposite sign.
-
-    Raise InputError if the unit must be wrong, or may be if it is `assumed`.
-    """
-    low, high = PEAKS
-    notes = []
-    if not low <= peak <= high:
-        allowed = f"{low:g} to {high:g} N for heavy/soft sources"
-        if assumed:
-            unknown = f"{name}: the values are without a unit and reach {peak:.4g}"
-            refuse(unknown, f"{allowed}, or unit")
-        if low <= opposite <= high:
-            cause = "the polarity is wrong, or the force does not return from its peak"
-            refuse(f"{name}: the peaks are {-opposite:.4g} N and {peak:.4g} N; {cause}", allowed)
-        if not low / MAX_FACTOR <= peak <= high * MAX_FACTOR:
-            fitting = [unit for unit, size in WRONG_UNITS.items() if low <= peak * size <= high]
-            mends = [f"unit = {unit!r}" for unit in fitting] + ["a calibration"]
-            problem = f"{name}: the peak is {peak:.4g} N; unit or calibration is wrong"
-            refuse(problem, f"{allowed}; {', or '.join(mends)}")
-        notes.append(Note("peak_unusual", name, peak, low, high, "N"))
-    if opposite > MIN_PEAK_RATIO * peak:
-        others = {"opposite": -opposite}
-        notes.append(Note("polarity_doubtful", name, peak, unit="N", others=others))
-    return notes
 
 
 def open_signals(

@@ -97,24 +97,24 @@ def find_separator(line: str) -> str | None:
     return None if separator == "," and len(words) > 1 and are_numbers else separator
 
 
-def split_line(line: str, separator: str | None) -> list[str]:
+def split_line(line: str, separator: str | None, *, is_row: bool = False) -> list[str]:
     """Return the cells of a line without the blanks and quotes around them.
 
-    >>> split_line('"0,1" ;1,5', ";")
+    A row of numbers may have a comment behind them, and a line of titles a # in one.
+
+    >>> split_line('"0,1" ;1,5  # touch', ";", is_row=True)
     ['0,1', '1,5']
     """
+    if is_row:
+        line = COMMENT.split(line, 1)[0].strip(" \r").rstrip(TRAILING.replace(separator or " ", ""))
+        if not line:
+            return []
     if '"' in line:
         words = csv.reader([line], delimiter=separator or " ", skipinitialspace=True)
         return [cell.strip() for cell in next(words)]
     if separator is None:  # other blanks group digits
         return re.split("[ \t]+", line)
     return [cell.strip() for cell in line.split(separator)]
-
-
-def split_row(line: str, separator: str | None) -> list[str]:
-    """Return the cells of a line of numbers without a comment behind them."""
-    text = COMMENT.split(line, 1)[0].strip(" \r").rstrip(TRAILING.replace(separator or " ", ""))
-    return split_line(text, separator) if text else []
 
 
 def _words(text: str) -> frozenset[str]:
@@ -473,7 +473,7 @@ def _refuse_row(row: Row, layout: Layout, *, is_open: bool) -> None:
     With `is_open` the columns have no titles yet.
     """
     is_last, is_comment = row.number == layout.first - 1, row.line.strip(" ")[:1] in tuple(COMMENTS)
-    cells = [] if is_comment else split_row(row.line, layout.separator)
+    cells = [] if is_comment else split_line(row.line, layout.separator, is_row=True)
     if len(cells) >= layout.width and any(map(is_number, cells)):
         # A word may stand in front of the numbers of the first row.
         is_row = is_last and all(is_number(cells[i]) for i in layout.units)

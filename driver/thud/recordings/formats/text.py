@@ -35,7 +35,7 @@ from thud.recordings.words import (
     read_facts,
     read_header,
     read_quantity,
-    split_row,
+    split_line,
 )
 
 if TYPE_CHECKING:
@@ -239,7 +239,7 @@ def _find_numbers(lines: list[str], name: str, allowed: str, separator: str | No
             bare = text.rstrip(TRAILING)
             # Behind the only number of a line, a mark shows that its comma separates nothing.
             mark = find_separator(text if is_number(bare) else bare)
-        cells = split_row(line, mark)
+        cells = split_line(line, mark, is_row=True)
         filled = [i for i, cell in enumerate(cells) if cell]
         dates = [i for i in filled if DATE_TIME.fullmatch(cells[i])]
         quantities = {
@@ -264,7 +264,7 @@ def _find_decimal(lines: list[str], layout: Layout) -> tuple[str, int]:
     for line, text in enumerate(lines[layout.first - 1 :], layout.first):
         if "." not in text and "," not in text:
             continue
-        cells = split_row(text, layout.separator)
+        cells = split_line(text, layout.separator, is_row=True)
         for cell in (cells[i] for i in layout.units if i < len(cells)):
             if "." not in cell and "," not in cell:
                 continue
@@ -310,8 +310,11 @@ def _read_numbers(
                     else np.empty((0, count))  # of which NumPy warns
                 )
         if values is None or values.shape[1] != count:
-            cells = [(line, split_row(row, separator)) for line, row in enumerate(block, start + 1)]
-            read = [_read_row(line, row, layout, decimal, shown) for line, row in cells if row]
+            read = [
+                _read_row(number, cells, layout, decimal, shown)
+                for number, line in enumerate(block, start + 1)
+                if (cells := split_line(line, separator, is_row=True))
+            ]
             values = np.array(read, dtype=np.float64).reshape(-1, count)
         blocks.append(values)
     return np.concatenate(blocks)
