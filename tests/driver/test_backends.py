@@ -19,14 +19,13 @@ from distributed import Client, LocalCluster
 
 import thud
 from thud.studies import run
-from thud.studies.run import dask_executor, evaluate
+from thud.studies.run import evaluate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from pathlib import Path
 
     import xarray as xr
-    from conftest import ErrorsOf
 
 # Some of these samples fail; by this method of the levels they make several blocks.
 STUDY: dict[str, Any] = {
@@ -52,6 +51,14 @@ cluster = LocalCluster(
 )
 print(cluster.scheduler_address, flush=True)
 input()
+"""
+# A study whose samples a scheduler computes.
+BY_DASK = """
+import sys, thud
+from distributed import Client
+study, folder, address = sys.argv[1:]
+executor = Client(address, set_as_default=False).get_executor()
+thud.sweep(study, folder, executor=executor)
 """
 
 
@@ -93,7 +100,7 @@ def test_every_executor_gives_the_same(
 
 def test_threads_of_a_block_do_not_matter() -> None:
     columns = {"height": np.linspace(0, 60, 200)}
-    one = evaluate(thud.Case(), columns, thud.__version__)
+    one = evaluate(thud.read_study({"height": [1.0]}), columns, thud.__version__)
     more = thud.solve_many(columns, thud.Case(), threads=3)
     for name in ("peak_force", "margin", "status", "reason"):
         np.testing.assert_array_equal(one[name], getattr(more, name))
@@ -121,8 +128,8 @@ def test_killed_worker_of_dask_loses_nothing(
     with Client(cluster, set_as_default=False) as client:
         pids = list(client.run(os.getpid).values())
     kill_at_first_block(monkeypatch, lambda: os.kill(pids[0], signal.SIGKILL))
-    with dask_executor(cluster.scheduler_address) as executor:
-        found = thud.sweep(MODAL, tmp_path, executor=executor).dataset
+    with Client(cluster, set_as_default=False) as client:
+        found = thud.sweep(MODAL, tmp_path, executor=client.get_executor()).dataset
     assert found.drop_attrs(deep=False).identical(expected_modal)
 
 
@@ -140,49 +147,24 @@ def test_lost_scheduler_is_reported_and_its_study_goes_on_elsewhere(
     ) as doomed:
         assert doomed.stdout
         address = doomed.stdout.readline().strip()
-        command = [sys.executable, "-m", "thud", "sweep", str(study), "-q", "-o", str(tmp_path)]
-        command += ["--scheduler", address]
+        command = [sys.executable, "-c", BY_DASK, str(study), str(tmp_path), address]
         process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
         while not list(tmp_path.glob("some.partial/block_*.nc")):
             assert process.poll() is None
             time.sleep(0.01)
         doomed.kill()
     _, errors = process.communicate()
-    assert process.returncode == 2
-    assert re.search(naming(study, "executor", "Cancelled"), errors)
-    assert errors.count("\n") == 1
+    assert process.returncode == 1
+    assert re.search(naming("NumericalError", "executor", "Cancelled"), errors)
     finished = thud.read_sweep(tmp_path / "some.partial").dataset
     assert 0 < finished.sizes["sample"] < 400
     found = thud.sweep(study, tmp_path).dataset
     assert found.drop_attrs(deep=False).identical(expected_modal)
 
 
-def test_unreachable_scheduler_is_reported_soon(
-    tmp_path: Path, errors_of: ErrorsOf, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("thud.studies.run.SCHEDULER_TIMEOUT", 1)
-    path = tmp_path / "study.toml"
-    path.write_text("parameters.height.values = [1]")
-    for address in ("tcp://127.0.0.1:9", "nonsense://"):
-        arguments = ["sweep", "-q", str(path), "-o", str(tmp_path), "--scheduler", address]
-        errors = errors_of(*arguments)
-        assert re.search(naming("scheduler", f"'{address}'", "1 s"), errors)
-        assert errors.count("\n") == 1
-
-
-def test_scheduler_without_workers_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("thud.studies.run.SCHEDULER_TIMEOUT", 1)
-    with (
-        LocalCluster(n_workers=0, processes=False, dashboard_address=":0") as empty,
-        pytest.raises(thud.InputError, match=naming("scheduler", "worker", "1 s")),
-        dask_executor(empty.scheduler_address),
-    ):
-        pass
-
-
 def test_other_version_is_reported() -> None:
     with pytest.raises(thud.InputError, match=naming("version", "0.0.1", thud.__version__)):
-        evaluate(thud.Case(), {"height": np.ones(1)}, "0.0.1")
+        evaluate(thud.read_study({"height": [1.0]}), {"height": np.ones(1)}, "0.0.1")
 
 
 @pytest.mark.parametrize("workers", [0, 2000])

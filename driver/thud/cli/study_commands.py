@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -34,7 +33,7 @@ _WORKERS = option("--workers", "N", "threads (default: one per processor)", type
 def run_study(options: argparse.Namespace) -> int:
     """Run a study, save files and figures, print its results; return the exit code."""
     result = result_type(options.name)
-    from thud.studies.run import compute, dask_executor, describe
+    from thud.studies.run import compute, describe
     from thud.studies.study import read_study
 
     study = read_study(options.study, options.name)
@@ -42,13 +41,11 @@ def run_study(options: argparse.Namespace) -> int:
         print_status(describe(study))
     folder = Path(options.output or Path("outputs", study.name))
     figures = () if options.no_figures else (f"{study.name}.svg",)
-    scheduler = options.scheduler
     try:
-        with dask_executor(scheduler) if scheduler else nullcontext() as executor:
-            computed = compute(
-                result, study, folder, figures, executor=executor, workers=options.workers,
-                replace=options.replace, progress=shows_progress(quiet=options.quiet),
-            )  # fmt: skip
+        computed = compute(
+            result, study, folder, figures, workers=options.workers, replace=options.replace,
+            progress=shows_progress(quiet=options.quiet),
+        )  # fmt: skip
     except ThudError as error:
         raise error.within(options.study) from error
     for name, content in figures_of(options, {study.name: computed.plot}).items():
@@ -73,7 +70,6 @@ for _name, _kind in KINDS.items():
         _STUDY,
         *output("the results; an interrupted study resumes there (default: outputs/<study name>)"),
         _WORKERS,
-        option("--scheduler", "ADDRESS", "address of a Dask scheduler, such as tcp://host:8786"),
         NO_FIGURES,
         QUIET,
     )(run_study)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import os
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
@@ -15,7 +14,6 @@ from tqdm import tqdm
 from thud.base.bridge import api, version
 from thud.base.checks import refuse, refuse_unknown, require_kind, require_whole, shown
 from thud.base.errors import InputError, NumericalError, ThudError
-from thud.base.extras import require_extra
 from thud.base.files import replace_file
 from thud.impact.ensemble import MAX_THREADS, solve_many
 from thud.studies.dataset import (
@@ -41,8 +39,6 @@ if TYPE_CHECKING:
 
 R = TypeVar("R", bound="SampleResult")
 
-# Maximum time until a scheduler replies and has a worker, s.
-SCHEDULER_TIMEOUT = 5.0
 # Number of blocks that an executor of the caller has at a time: its width is not known.
 _SUBMITTED = 256
 
@@ -289,32 +285,3 @@ def evaluate(study: Study, columns: Columns, required: str) -> Columns:
     results = solve_many(columns, study.case, threads=1, forces=forces).results
     results["status"] = results["status"].astype("int8")
     return results
-
-
-@contextmanager
-def dask_executor(address: str) -> Iterator[Executor]:
-    """Yield the executor of a Dask scheduler; raise InputError if it has no worker in time."""
-    with require_extra("dask"):
-        from distributed import Client
-    # Failures are raised as one message.
-    logging.disable(logging.CRITICAL)
-    try:
-        try:
-            client = Client(  # type: ignore[no-untyped-call]
-                address, timeout=SCHEDULER_TIMEOUT, set_as_default=False
-            )
-            client.wait_for_workers(1, timeout=SCHEDULER_TIMEOUT)
-        except (OSError, ValueError, TypeError) as error:
-            refuse(
-                f"scheduler = {shown(address)} has no worker within {SCHEDULER_TIMEOUT:g} s",
-                "the address of a running scheduler with workers, such as tcp://host:8786",
-                error,
-            )
-        with client:
-            executor = client.get_executor()  # type: ignore[no-untyped-call]
-            try:
-                yield executor
-            finally:
-                executor.shutdown(wait=False)
-    finally:
-        logging.disable(logging.NOTSET)
