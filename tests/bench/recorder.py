@@ -323,8 +323,10 @@ def measure(task: tuple[int, int]) -> Outcome:
                 return Outcome(index, seed, values, 1, warnings=said)
             paths, config, truth = record(condition, seed, Path(directory))
             recording = thud.read_recording(paths, config=config)
-            said = [note.message for note in recording.notes if note.is_warning]
-            said += [str(warning.message) for warning in caught]
+            said = (
+                *(n.message for n in recording.notes if n.is_warning),
+                *(str(warning.message) for warning in caught),
+            )
             values = dict(compare(recording, truth, said))
         except InputError as error:
             text = str(error).replace(directory, "")

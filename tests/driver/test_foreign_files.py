@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import signal
 import subprocess
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -146,10 +146,10 @@ def name(request: pytest.FixtureRequest, tmp_path: Path) -> str:
 
 
 def _report() -> str:
-    from thud.report.contents import report_data
+    from thud.report.contents import json_bytes, report_data
 
     data = report_data(thud.read_recording(RECORDINGS / "drop_1.csv", height=1.0, mass=2.5))
-    return json.dumps({**data, "date": "2024-05-03"})
+    return json_bytes(replace(data, date="2024-05-03")).decode()
 
 
 def names_written(out: Path) -> list[str]:

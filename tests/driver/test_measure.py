@@ -25,7 +25,7 @@ from thud.recordings.checks.plate import check_plate
 from thud.recordings.config import Config, read_config
 from thud.recordings.instruments import AMPLITUDE_DECIBEL, Plate
 from thud.recordings.signal import Signal
-from thud.report.contents import report_data
+from thud.report.contents import report_criteria
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -201,8 +201,8 @@ def test_limits_of_the_configuration_are_those_of_the_verdict(tmp_path: Path) ->
     assert [d.name for d in verdict.criteria if not d] == ["octave_500"]
     boxes = {box.get_label() for box in recording.plot().axes[0].get_children()}
     assert "Tolerance, rubber ball, own limits" in boxes
-    (row,) = [one for one in report_data(recording)["criteria"] if one["name"] == "octave_500"]
-    assert (row["lower"], row["upper"], row["limits_of_standard"]) == (20.0, 30.0, False)
+    (row,) = [row for row in report_criteria(recording) if row.criterion.name == "octave_500"]
+    assert (row.criterion.lower, row.criterion.upper, row.has_own_limits) == (20.0, 30.0, True)
 
 
 def test_faults_of_the_samples_are_found_before_the_correction_of_a_plate(tmp_path: Path) -> None:

@@ -26,7 +26,8 @@ from test_figure_look import assert_clean
 import thud
 from thud.base.errors import ReportWarning
 from thud.base.note import Note
-from thud.level.estimate import Estimate
+from thud.level.assessment import Criterion, criterion_quantity
+from thud.level.estimate import NORMAL_FACTOR, Contribution, Estimate
 from thud.level.levels import low_pass
 from thud.plot.recording_figures import recording_forces, recording_levels
 from thud.recordings.config import Config, read_config
@@ -34,7 +35,14 @@ from thud.recordings.instruments import Plate
 from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.recording import Recording, read_recording
 from thud.recordings.words import read_date
-from thud.report.contents import FIELDS, criteria_data, missing_fields, report_data
+from thud.report.contents import (
+    REQUIRED,
+    ReportCriterion,
+    json_bytes,
+    missing_keys,
+    report_criteria,
+    report_data,
+)
 from thud.report.notes import group_notes
 from thud.report.page import BUDGET_HEAD, range_picture, report_page
 from thud.report.pdf import html_to_pdf, missing_characters
@@ -201,12 +209,18 @@ def print_page(folder: Path) -> Path:
     return target
 
 
+def data_of(recording: Recording) -> dict[str, Any]:
+    """Return the content of ``report.json``."""
+    data: dict[str, Any] = json.loads(json_bytes(report_data(recording)))
+    return data
+
+
 def test_page_holds_the_rows_of_the_table(written: tuple[Recording, Path]) -> None:
     recording, folder = written
     page = (folder / "report.html").read_text().replace("\N{NO-BREAK SPACE}", " ")
     found = re.findall(r'<tr class="[a-z-]+">(.*?)</tr>', page, re.DOTALL)
     printed = text_of(folder / "report.pdf")
-    for row, entry in zip(found, criteria_data(recording), strict=True):
+    for row, entry in zip(found, report_criteria(recording), strict=True):
         cells = [html.unescape(re.sub(r"<[^>]*>", "", cell)) for cell in row.split("</td>")]
         expected = [*criterion_row(entry)]
         assert [cell for cell in map(str.strip, cells) if cell] == expected
@@ -243,7 +257,7 @@ def test_signature_is_on_a_page_with_the_last_notes(one: Recording, tmp_path: Pa
     for count in range(14, 24):
         steps = [f"last note {i} " + "of some length " * 4 for i in range(count)]
         path = tmp_path / f"{count}.pdf"
-        path.write_bytes(html_to_pdf(report_page({**data, "processing": steps}, figures)))
+        path.write_bytes(html_to_pdf(report_page(replace(data, processing=steps), figures)))
         pages = [page.get_textpage().get_text_bounded() for page in open_pdf(path)]
         assert "last note" in pages[-1]
         assert "Signature" in pages[-1]
@@ -309,9 +323,9 @@ def test_data_are_those_of_the_recording(written: tuple[Recording, Path]) -> Non
 
 
 def test_date_is_that_of_the_files(one: Recording) -> None:
-    assert report_data(many(one, 3))["date"] == "2024-05-03 to 2024-05-04"
-    assert report_data(one)["date"] == ""
-    assert report_data(many(one, 3, date="7.6.2024"))["date"] == "2024-06-07"
+    assert data_of(many(one, 3))["date"] == "2024-05-03 to 2024-05-04"
+    assert data_of(one)["date"] == ""
+    assert data_of(many(one, 3, date="7.6.2024"))["date"] == "2024-06-07"
 
 
 @pytest.mark.parametrize(
@@ -539,28 +553,28 @@ def test_page_states_what_the_laboratory_states(one: Recording, tmp_path: Path) 
     (image,) = re.findall(r'<img[^>]*src="data:image/svg\+xml;base64,([^"]*)"', page)
     assert base64.b64decode(image).decode() == MARK
     assert r'content: "Report 2024\2d 17"' in page
-    assert data["report"]["accreditation_mark"] == "mark.svg"
-    assert str(tmp_path) not in json.dumps(data)
+    content = json_bytes(data).decode()
+    assert json.loads(content)["report"]["accreditation_mark"] == "mark.svg"
+    assert str(tmp_path) not in content
 
 
 def test_what_iso_17025_asks_for_and_is_not_stated_is_listed(
     one: Recording, tmp_path: Path
 ) -> None:
     recording = stated(one, tmp_path)
-    missing = missing_fields(recording.config, recording.origins)
+    missing = missing_keys(recording.config, recording.origins)
     assert missing == [
-        "ball", "serial number", "metrological traceability", "temperature",
-        "certificates of instruments",
+        "ball", "serial", "traceability", "temperature", "instruments: certificate",
     ]  # fmt: skip
     text = STATED.replace("procedure =", 'traceability = "to the SI by K-1"\nprocedure =')
     traceable = stated(one, tmp_path, text)
-    missing.remove("metrological traceability")
-    assert missing_fields(traceable.config, traceable.origins) == missing
+    missing.remove("traceability")
+    assert missing_keys(traceable.config, traceable.origins) == missing
     assert "Traceability to the SI by K-1" in words_of(traceable)
-    nothing = missing_fields(Config(), one.origins)
-    assert nothing == [*FIELDS.values(), "instruments"]
+    nothing = missing_keys(Config(), one.origins)
+    assert nothing == [*REQUIRED, "instruments"]
     # The files have dates.
-    assert "date of the measurement" not in missing_fields(Config(), many(one, 2).origins)
+    assert "date" not in missing_keys(Config(), many(one, 2).origins)
 
 
 @pytest.mark.parametrize(
@@ -595,7 +609,7 @@ def test_marks_that_are_no_pictures_are_refused(
 
 def test_budgets_combine_to_the_uncertainty(one: Recording, tmp_path: Path) -> None:
     recording = stated(one, tmp_path)
-    data = report_data(recording)
+    data = data_of(recording)
     words = words_of(recording)
     for entry in data["criteria"]:
         parts = [part for part in entry["contributions"] if part["counted"]]
@@ -630,13 +644,13 @@ def test_degrees_of_freedom_and_risks_are_bounds_where_they_round() -> None:
     for freedom in (1.0, 1.2345, 1.9876, 2.71828, 4.0, 8.4999, 17.777, 234.56):
         k = stdtrit(freedom, 0.975)
         assert stdtrit(float(freedom_text(freedom)), 0.975) == pytest.approx(k, abs=0.01)
-    assert (freedom_text(2000.0), freedom_text(None)) == ("> 1000", "∞")
+    assert (freedom_text(2000.0), freedom_text(np.inf)) == ("> 1000", "∞")
     assert [risk_text(p) for p in (0.0, 4e-4, 6e-4)] == ["> 99.9 %", "> 99.9 %", "99.9 %"]
 
 
 def excluded(recording: Recording) -> dict[str, list[str]]:
     """Return what the uncertainties exclude, by criterion."""
-    return {entry["name"]: entry["excluded"] for entry in report_data(recording)["criteria"]}
+    return {entry["name"]: entry["excluded"] for entry in data_of(recording)["criteria"]}
 
 
 SCATTER = "scatter between drops"
@@ -651,14 +665,14 @@ def test_uncertainties_that_lack_contributions_are_marked(one: Recording) -> Non
     assert lacking["mass"] == ["mass"]
     assert lacking["drop_height"] == ["drop height"]
     assert lacking["peak_count"] == []
-    note = excluded_text(criteria_data(one))
+    note = excluded_text(report_criteria(one))
     assert note.startswith(
         "† U excludes calibration, mass, drop height (uncertainty not stated: undecided); scatter "
         "between drops (unknown from one drop). Stated standard uncertainties that decide:"
     )
     assert note in words_of(one)
     assert "U is incomplete where it is marked †" in words_of(one)
-    marked = [row[0] for row in table(criteria_data(one))[1:] if row[2].endswith(" †")]
+    marked = [row[0] for row in table(report_criteria(one))[1:] if row[2].endswith(" †")]
     assert len(marked) == 9
     assert "Force peaks" not in marked
 
@@ -666,7 +680,7 @@ def test_uncertainties_that_lack_contributions_are_marked(one: Recording) -> Non
 def test_complete_uncertainties_are_not_marked(one: Recording, tmp_path: Path) -> None:
     recording = stated(one, tmp_path)
     assert not any(excluded(recording).values())
-    assert excluded_text(criteria_data(recording)) == ""
+    assert excluded_text(report_criteria(recording)) == ""
     assert "†" not in report_page(report_data(recording))
     # An effective mass has the uncertainties of its origins.
     effective = replace(many(one, 1), config=replace(LAB, mass=None), calibration_uncertainty=None)
@@ -678,7 +692,7 @@ def test_complete_uncertainties_are_not_marked(one: Recording, tmp_path: Path) -
 def test_rectangular_distributions_have_their_half_width_and_divisor() -> None:
     folder = REPOSITORY / "inputs/recordings"
     drops = read_recording(folder / "three_drops.flac", config=read_config(folder / "lab.toml"))
-    (entry,) = [e for e in report_data(drops)["criteria"] if e["name"] == "restitution"]
+    (entry,) = [e for e in data_of(drops)["criteria"] if e["name"] == "restitution"]
     parts = {part["name"]: part for part in entry["contributions"]}
     for name, size, unit in (("slow release", 5e-4, "s"), ("deformed ball", 4e-3, "m")):
         part = parts[name]
@@ -710,50 +724,59 @@ def test_page_names_measurand_rules_standards_plate_and_outliers(
     assert not [text for text in (*words, *map(str, recording.outliers)) if text not in page]
 
 
-ENTRY = {
-    "name": "octave_63", "unit": "dB", "band": 63.0, "value": 38.8104, "upper_bound": False,
-    "expanded_uncertainty": 0.08637, "contributions": [{}], "lower": 29.5, "upper": 90.0,
-    "limits_of_standard": True, "margin": -1.23456, "probability": 0.9871, "spread": 0.1234,
-    "excluded": [], "background": -3.456, "verdict": "conforms",
-}  # fmt: skip
+def criterion(
+    value: float,
+    expanded: float,
+    name: str = "octave_63",
+    limits: tuple[float, float] = (29.5, 90.0),
+    **stated: Any,  # noqa: ANN401
+) -> Criterion:
+    """Return a criterion with an expanded uncertainty, whose budget has one contribution."""
+    standard = expanded / NORMAL_FACTOR
+    budget = {"contributions": (Contribution("noise", standard),), **stated}
+    unit = criterion_quantity(name).unit
+    return Criterion(name, Estimate(value, standard, unit, **budget), *limits)
 
 
 @pytest.mark.parametrize(
-    ("change", "column", "text"),
+    ("entry", "column", "text"),
     [
         # Value and margin have the digits of the uncertainty.
-        ({}, slice(None), ("63 Hz, dB", "38.810", "0.086", "29.5 to 90", "−1.235", "1.3 %", "0.12",
-                           "−3.46", "conforms")),
-        ({"expanded_uncertainty": 0.0996}, slice(1, 3), ("38.81", "0.10")),
-        ({"expanded_uncertainty": 0.00996}, slice(1, 3), ("38.810", "0.010")),
-        ({"expanded_uncertainty": 1.234}, slice(1, 3), ("38.8", "1.2")),
-        ({"value": 138.4, "expanded_uncertainty": 12.34}, slice(1, 3), ("138", "12")),
-        ({"value": 1384.0, "expanded_uncertainty": 123.4}, slice(1, 3), ("1380", "120")),
-        ({"expanded_uncertainty": 0.0}, slice(1, 3), ("38.81", "0")),
-        ({"value": -0.0004, "expanded_uncertainty": 0.12}, slice(1, 3), ("0.00", "0.12")),
-        ({"value": None}, slice(1, 3), ("not known", "–")),
-        ({"upper_bound": True, "margin": None}, 1, "at most 38.810"),
-        ({"margin": None}, 4, "–"),
-        ({"contributions": []}, 2, "not stated"),
-        ({"contributions": []}, 5, "–"),
-        ({"excluded": ["mass"]}, 2, "0.086 †"),
-        ({"limits_of_standard": False}, 3, "29.5 to 90 *"),
-        ({"lower": 1.0, "upper": 1.0}, 3, "1"),
-        ({"spread": None, "background": None}, slice(6, 8), ("–", "–")),
-        ({"name": "contact_time", "value": 0.01934, "expanded_uncertainty": 1.1e-4}, slice(3),
+        (criterion(38.8104, 0.08637), slice(None), ("63 Hz, dB", "38.810", "0.086", "29.5 to 90",
+         "9.310", "< 0.01 %", "0.12", "−3.46", "conforms")),
+        (criterion(28.26544, 0.08637), 4, "−1.235"),
+        (criterion(38.8104, 0.0996), slice(1, 3), ("38.81", "0.10")),
+        (criterion(38.8104, 0.00996), slice(1, 3), ("38.810", "0.010")),
+        (criterion(38.8104, 1.234), slice(1, 3), ("38.8", "1.2")),
+        (criterion(138.4, 12.34), slice(1, 3), ("138", "12")),
+        (criterion(1384.0, 123.4), slice(1, 3), ("1380", "120")),
+        (criterion(38.8104, 0.0), slice(1, 3), ("38.81", "0")),
+        (criterion(-0.0004, 0.12), slice(1, 3), ("0.00", "0.12")),
+        (criterion(np.nan, 0.1), slice(1, 3), ("not known", "–")),
+        (criterion(38.8104, 0.08637, upper_bound=True), 1, "at most 38.810"),
+        (criterion(38.8104, 0.08637, upper_bound=True), 4, "–"),
+        (criterion(38.8104, 0.08637, contributions=()), 2, "not stated"),
+        (criterion(38.8104, 0.08637, contributions=()), 5, "–"),
+        (criterion(1.0, 0.0, "peak_count", (1.0, 1.0)), slice(2, 5), ("–", "1", "–")),
+        (criterion(0.01934, 1.1e-4, "contact_time"), slice(3),
          ("Contact time, ms", "19.34", "0.11")),
     ],
 )  # fmt: skip
 def test_criterion_is_a_row_of_text(
-    change: dict[str, Any], column: int | slice, text: str | tuple[str, ...]
+    entry: Criterion, column: int | slice, text: str | tuple[str, ...]
 ) -> None:
-    assert criterion_row(ENTRY | change)[column] == text
+    row = criterion_row(ReportCriterion(entry, 0.1234, -3.456, "", (), has_own_limits=False))
+    assert row[column] == text
+    own = ReportCriterion(entry, np.nan, np.nan, "", ("mass",), has_own_limits=True)
+    marked = criterion_row(own)
+    assert marked[2:4] == (f"{row[2]} †", f"{row[3]} *")
+    assert marked[6:8] == ("–", "–")
 
 
 def test_report_lists_single_drops_and_units_stay_with_numbers(one: Recording) -> None:
     recording = many(one, 3)
     data = report_data(recording)
-    head, *rows = drop_table(data)
+    head, *rows = drop_table(recording)
     levels = recording.average().drops.level
     assert [row[0] for row in rows] == [drop.name for drop in recording.drops]
     for row, drop, own in zip(rows, recording.drops, levels, strict=True):
@@ -783,8 +806,8 @@ def test_contributions_of_nothing_are_no_rows_of_a_budget(one: Recording, tmp_pa
     shares = re.findall(r'data-label="Share">([^<]*)<', report_page(report_data(recording)))
     assert shares
     assert "0.0\N{NO-BREAK SPACE}%" not in shares
-    level = criteria_data(recording)[0]
-    sizes = [part["uncertainty"] / level["uncertainty"] for part in level["contributions"]]
+    level = report_criteria(recording)[0].criterion.estimate
+    sizes = [part.uncertainty / level.uncertainty for part in level.contributions]
     assert any(0 < size < 0.01 for size in sizes)
 
 
@@ -827,16 +850,15 @@ def test_drops_that_were_left_out_are_listed(one: Recording) -> None:
         # The limits lie at 25 and 75 of 100.
         (15.0, 2.0, (50.0, 40.0, 60.0, 0)),
         (20.0, 6.0, (75.0, 45.0, 99.0, 0)),
-        (12.0, None, (35.0, 35.0, 35.0, 0)),
+        (12.0, np.nan, (35.0, 35.0, 35.0, 0)),
         (1.0, 1.0, (2.0, 1.0, 1.0, -1)),
         (30.0, 1.0, (98.0, 99.0, 99.0, 1)),
-        (None, None, None),
+        (np.nan, 1.0, None),
     ],
 )
 def test_picture_of_a_criterion_has_value_and_uncertainty_between_the_limits(
-    value: float | None, expanded: float | None, picture: tuple[float, ...] | None
+    value: float, expanded: float, picture: tuple[float, ...] | None
 ) -> None:
-    found = range_picture({
-        "value": value, "expanded_uncertainty": expanded, "lower": 10.0, "upper": 20.0
-    })  # fmt: skip
+    entry = criterion(value, expanded, limits=(10.0, 20.0))
+    found = range_picture(ReportCriterion(entry, 0.0, 0.0, "", (), has_own_limits=False))
     assert found == (picture and pytest.approx(picture))

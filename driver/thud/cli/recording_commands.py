@@ -82,7 +82,7 @@ def measure(options: argparse.Namespace) -> int:
     """Measure recordings, print the verdict and save results; return the exit code."""
     from thud.recordings.recording import read_recording
     from thud.report import recording_files
-    from thud.report.contents import missing_fields, report_data
+    from thud.report.contents import missing_keys, report_data
     from thud.report.rows import drop_table, excluded_text
 
     figures = not options.no_figures
@@ -98,20 +98,20 @@ def measure(options: argparse.Namespace) -> int:
     recording = read_recording(options.recordings, config=config, progress=progress)
     data = report_data(recording)
     stages = recording.stages if options.stages else None
-    recording_files.save(recording, data, results, figures=figures, stages=stages)
-    rows = drop_table(data)
+    recording_files.save(data, results, figures=figures, stages=stages)
+    rows = drop_table(recording)
     parts = [format_rows(rows[: MAX_PRINTED + 1])]
     if len(rows) > MAX_PRINTED + 1:
         path = results.folder / "report.json"
         parts.append(f"and {len(rows) - MAX_PRINTED - 1} more drops: {path}")
-    parts += ["", format_rows(recording_files.table(data["criteria"])), ""]
-    lines = [*data["left_out"], *data["processing"], recording_files.verdict_text(data)]
-    lines.append(excluded_text(data["criteria"]))
+    parts += ["", format_rows(recording_files.table(data.criteria)), ""]
+    lines = [*data.left_out, *data.processing, recording_files.verdict_text(data)]
+    lines.append(excluded_text(data.criteria))
     if figures:
-        missing = ", ".join(missing_fields(recording.config, recording.origins)) or "nothing"
+        missing = ", ".join(missing_keys(recording.config, recording.origins)) or "nothing"
         lines.append(f"Missing in the report (ISO/IEC 17025:2017, 7.8): {missing}")
     shown = "\n".join([*parts, *(f"  {line}" for line in lines if line)])
-    return finish(options, results, {}, shown, data["warnings"], recording.assess())
+    return finish(options, results, {}, shown, data.warnings, data.verdict)
 
 
 def _left_out(options: argparse.Namespace) -> dict[str, str]:

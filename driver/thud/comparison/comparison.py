@@ -97,7 +97,6 @@ class Comparison(Tabulated):
             criteria[0].quantity: [criterion.value for criterion in criteria]
             for criteria in zip(*(verdict.criteria for verdict in verdicts), strict=True)
         }
-        forms = {quantity: f"z.{quantity.decimals}f" for quantity in values}
         values[QUANTITIES["peak_force"]] = [impact.peak(self.force) for impact in impacts]
         for other in map(QUANTITIES.__getitem__, _OTHERS):
             values[other] = [impact.quantity(other.name) for impact in impacts]
@@ -107,7 +106,7 @@ class Comparison(Tabulated):
             "assessed force": ([impact.assessed_force(self.force) for impact in impacts], ""),
             "method of levels": ([impact.case.levels.method for impact in impacts], ""),
             **{
-                quantity.label: (quantity.display_scale * np.array(row), forms.get(quantity, ".4g"))
+                quantity.label: (quantity.display_scale * np.array(row), f"z.{quantity.decimals}f")
                 for quantity, row in values.items()
             },
             "computing time, ms": (times, ".3g"),

@@ -18,10 +18,10 @@ from thud.recordings.config import config_from
 from thud.recordings.instruments import ASSUMED_SHARE
 from thud.recordings.recording import read_recording
 from thud.recordings.signal import open_signals
-from thud.report.contents import criteria_data, report_data
+from thud.report.contents import report_criteria, report_data
 from thud.report.page import report_page
 from thud.report.recording_files import draw_figures
-from thud.report.rows import INCOMPLETE, excluded_text, expanded_text, value_text
+from thud.report.rows import INCOMPLETE, entry_text, excluded_text, expanded_text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -43,11 +43,11 @@ def answer_recording(paths: Sequence[str], table: Mapping[str, Any]) -> dict[str
     recording = read_copies(paths, table)
     verdict = recording.assess()
     answer = common_answer(recording, verdict, *contact_force(recording, "floor"))
-    rows = criteria_data(recording)
+    rows = report_criteria(recording)
     for entry, row in zip(answer["criteria"], rows, strict=True):
-        entry["value_text"] = value_text(row)
+        entry["value_text"] = entry_text(row)
         entry["uncertainty_text"] = expanded_text(row)
-        entry["mark"] = INCOMPLETE if row["excluded"] else ""
+        entry["mark"] = INCOMPLETE if row.excluded else ""
     answer["excluded"] = excluded_text(rows, "The uncertainty")
     answer["largest"] = largest_contribution(verdict) or ()
     answer["limits"]["assumed"] = "source" not in table

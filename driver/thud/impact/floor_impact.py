@@ -47,7 +47,7 @@ class FloorEnergy(Tabulated):
 
     def __repr__(self) -> str:
         """Return the energy in all frequencies."""
-        return f"<FloorEnergy: {1e3 * self.total:.3g} mJ in {len(self.frequency)} bands and beyond>"
+        return f"<FloorEnergy: {self.total:.3g} J, {len(self.frequency)} bands>"
 
     def columns(self) -> Columns:
         """Return energy and conductance."""

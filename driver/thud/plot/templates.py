@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import base64
 import re
-from typing import Any
 
-from jinja2 import Environment, PackageLoader
+from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from thud.base.display import html_text
@@ -25,7 +24,7 @@ def plain(text: str) -> str:
     return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in line)
 
 
-def _typeset(value: Any) -> Any:  # noqa: ANN401 - of a template
+def _typeset(value: object) -> object:
     """Return a text in one line with its numbers as they are printed; others as they are."""
     if not isinstance(value, str) or isinstance(value, Markup):
         return value
@@ -34,7 +33,7 @@ def _typeset(value: Any) -> Any:  # noqa: ANN401 - of a template
 
 def _symbols(text: str) -> Markup:
     """Return a text as HTML, with the indices of symbols below the line."""
-    return Markup(html_text(_typeset(text)))  # noqa: S704 - escaped
+    return Markup(html_text(f"{_typeset(text)}"))  # noqa: S704 - escaped
 
 
 def _css_string(text: str) -> Markup:
@@ -50,11 +49,13 @@ def _picture(content: bytes, media_type: str = "image/svg+xml") -> str:
     return f"data:{media_type};base64,{base64.b64encode(content).decode()}"
 
 
-_TEMPLATES = Environment(loader=PackageLoader("thud", ""), autoescape=True, finalize=_typeset)
+_TEMPLATES = Environment(
+    loader=PackageLoader("thud", ""), autoescape=True, finalize=_typeset, undefined=StrictUndefined
+)
 _TEMPLATES.globals["FAMILY"] = FAMILY
 _TEMPLATES.filters |= {"symbols": _symbols, "css": _css_string, "picture": _picture}
 
 
-def render(template: str, **values: Any) -> str:  # noqa: ANN401 - of a template
+def render(template: str, **values: object) -> str:
     """Return a page by its template, such as ``"report/floor.html"``."""
     return _TEMPLATES.get_template(template).render(values)

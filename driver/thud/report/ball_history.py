@@ -18,9 +18,10 @@ from thud.base._schema import VERDICTS
 from thud.base.checks import refuse
 from thud.base.files import require_regular
 from thud.base.immutable import Immutable
+from thud.level.assessment import criterion_quantity
 from thud.recordings.words import read_date
 from thud.report.contents import FORMAT
-from thud.report.rows import capital, number, quantity_of, value_text
+from thud.report.rows import capital, number, value_text
 
 if TYPE_CHECKING:
     import os
@@ -229,10 +230,15 @@ def _ball(report: dict[str, Any]) -> str:
 def _cell(entry: dict[str, Any]) -> str:
     """Return the value of a criterion, and whether it fails or is undecided."""
     verdict = entry["verdict"]
-    if verdict == VERDICTS[0] or entry["value"] is None:
-        return value_text(entry)
-    state = "low" if entry["value"] < entry["lower"] else "high"
-    return f"{value_text(entry)} {state if verdict == VERDICTS[1] else verdict}"
+    value, expanded = (
+        math.nan if entry[key] is None else entry[key] for key in ("value", "expanded_uncertainty")
+    )
+    quantity = criterion_quantity(entry["name"])
+    text = value_text(quantity, value, expanded, is_bound=entry["upper_bound"])
+    if verdict == VERDICTS[0] or math.isnan(value):
+        return text
+    state = "low" if value < entry["lower"] else "high"
+    return f"{text} {state if verdict == VERDICTS[1] else verdict}"
 
 
 def _degrees(value: float | None) -> str:
@@ -247,7 +253,7 @@ def _known(entries: tuple[dict[str, Any], ...], years: NDArray[np.float64]) -> S
         if entry["value"] is not None and not entry["upper_bound"]
     ]
     columns = np.array(rows, dtype=np.float64).reshape(-1, 3).T
-    return Series(quantity_of(entries[0]), entries, *columns)
+    return Series(criterion_quantity(entries[0]["name"]), entries, *columns)
 
 
 def _control_limits(values: NDArray[np.float64]) -> ControlLimits | None:

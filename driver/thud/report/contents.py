@@ -1,11 +1,12 @@
-"""Content of ``report.json``: a machine-readable calibration report."""
+"""Content of a calibration report: what its page and tables state, and ``report.json``."""
 
 from __future__ import annotations
 
 import json
 import math
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
     from thud.base._schema import BandSet
     from thud.base.note import Note
-    from thud.level.assessment import Criterion
+    from thud.level.assessment import Criterion, Verdict
     from thud.level.estimate import Estimate
     from thud.recordings.config import Config
     from thud.recordings.measured_drop import Drop
@@ -40,43 +41,110 @@ OF_THE_CONFIGURATION = (
     "height_uncertainty",
 )  # fmt: skip
 OF_A_FILE = ("name", "date", "calibration", "sample_rate", "drops")
-# What ISO/IEC 17025:2017, 7.8.2 to 7.8.4, asks of a report, by the key that states it.
-FIELDS = {
-    "number": "number of the report",
-    "laboratory": "laboratory",
-    "address": "address of the laboratory",
-    "client": "client",
-    "ball": "ball",
-    "serial": "serial number",
-    "item": "description of the item",
-    "state": "state of the item",
-    "received": "date of receipt",
-    "date": "date of the measurement",
-    "issued": "date of issue",
-    "place": "place",
-    "procedure": "procedure",
-    "traceability": "metrological traceability",
-    "temperature": "temperature",
-    "humidity": "humidity",
-    "pressure": "air pressure",
-    "authorized_by": "person who authorizes it",
-}
+# Keys of a configuration that state what ISO/IEC 17025:2017, 7.8.2 to 7.8.4, asks of a report.
+REQUIRED = (
+    "number", "laboratory", "address", "client", "ball", "serial", "item", "state", "received",
+    "date", "issued", "place", "procedure", "traceability", "temperature", "humidity", "pressure",
+    "authorized_by",
+)  # fmt: skip
 
 
-def report_data(recording: Recording) -> dict[str, Any]:
-    """Return the report of a recording as a JSON object; unknown values are None.
+@dataclass(frozen=True)
+class ReportCriterion:
+    """A criterion with what a report states beside it; NaN where a number is not known."""
 
-    Values are in SI units; uncertainties are standard uncertainties unless named expanded.
+    criterion: Criterion
+    # Standard deviation of single drops, level of the background, and what this does to a level.
+    spread: float
+    background: float
+    flag: str
+    # Contributions that the uncertainty should have, but lacks.
+    excluded: tuple[str, ...]
+    # Whether the limits are not those of the standards.
+    has_own_limits: bool
+
+    @property
+    def expanded(self) -> float:
+        """Expanded uncertainty; NaN if no contribution is stated."""
+        estimate = self.criterion.estimate
+        return estimate.expanded if estimate.contributions else math.nan
+
+    @property
+    def margin(self) -> float:
+        """Distance to the nearer limit; NaN for an upper bound or a single allowed value."""
+        criterion = self.criterion
+        has_range = criterion.lower < criterion.upper and not criterion.estimate.upper_bound
+        return criterion.margin if has_range else math.nan
+
+
+@dataclass(frozen=True)
+class ReportData:
+    """What the page of a report, its tables and ``report.json`` state."""
+
+    recording: Recording
+    criteria: tuple[ReportCriterion, ...]
+    # Day of the measurement, or its first and last day; empty if not stated.
+    date: str
+    # Sentences on drops that were left out, on what was done, and on possible faults.
+    left_out: list[str]
+    processing: list[str]
+    warnings: list[str]
+
+    @property
+    def verdict(self) -> Verdict:
+        """Verdict on the source."""
+        return self.recording.assess()
+
+
+def report_data(recording: Recording) -> ReportData:
+    """Return the content of the report of a recording."""
+    date = recording.config.date
+    return ReportData(
+        recording,
+        report_criteria(recording),
+        _dates([date] if date else [origin.date for origin in recording.origins]),
+        sentences(recording, lambda note: note.code == LEFT_OUT),
+        sentences(recording, lambda note: not note.is_warning and note.code != LEFT_OUT),
+        sentences(recording, lambda note: note.is_warning),
+    )
+
+
+def report_criteria(recording: Recording) -> tuple[ReportCriterion, ...]:
+    """Return the criteria of a recording with what a report states beside them."""
+    verdict, average = recording.assess(), recording.average()
+    count = len(verdict.criteria) - len(average.level)
+    spread, background = (
+        np.pad(values, (0, count), constant_values=np.nan).tolist()
+        for values in (average.spread, average.background)
+    )
+    entries = zip(
+        verdict.criteria, spread, background, [*average.flag.tolist(), *[""] * count],
+        LIMITS[verdict.source], strict=True,
+    )  # fmt: skip
+    spreads = {name: _spread(recording, name) for name in ("contact_time", "restitution")}
+    return tuple(
+        ReportCriterion(
+            criterion, spreads.get(criterion.name, own_spread), level, flag, _excluded(criterion),
+            (criterion.lower, criterion.upper) != (lower, upper),
+        )
+        for criterion, own_spread, level, flag, (*_, lower, upper) in entries
+    )  # fmt: skip
+
+
+def json_bytes(data: ReportData) -> bytes:
+    """Return the content of ``report.json``: values in SI units, None for unknown numbers.
+
+    Uncertainties are standard uncertainties unless named expanded.
     """
-    config, verdict = recording.config, recording.assess()
+    recording, config = data.recording, data.recording.config
     methods = compare_methods(recording.drops)
-    data: dict[str, Any] = {
+    members = {
         "format": FORMAT,
         "thud": version(),
         "name": recording.name,
-        "source": verdict.source,
+        "source": data.verdict.source,
         **{key: getattr(config, key) for key in OF_THE_CONFIGURATION},
-        "date": _dates([config.date] if config.date else [o.date for o in recording.origins]),
+        "date": data.date,
         "instruments": [vars(item) for item in config.instruments],
         "report": {
             **vars(config.report),
@@ -84,9 +152,9 @@ def report_data(recording: Recording) -> dict[str, Any]:
         },
         "properties": vars(config.properties),
         "calibration_uncertainty": recording.calibration_uncertainty,
-        "verdict": verdict.conforms,
+        "verdict": data.verdict.conforms,
         "confidence": CONFIDENCE,
-        "criteria": criteria_data(recording),
+        "criteria": [criterion_members(entry) for entry in data.criteria],
         "levels": {bands: _levels(recording, bands) for bands in BANDWIDTHS},
         "method_differences": {
             method: np.abs(values - methods["exact"]).max(axis=0).tolist()
@@ -97,11 +165,9 @@ def report_data(recording: Recording) -> dict[str, Any]:
             {"requirement": name, "met": met, "reason": str(note)}
             for name, (met, note) in check_plate(config.plate).items()
         ],
-        "left_out": sentences(recording, lambda note: note.code == LEFT_OUT),
-        "processing": sentences(
-            recording, lambda note: not note.is_warning and note.code != LEFT_OUT
-        ),
-        "warnings": sentences(recording, lambda note: note.is_warning),
+        "left_out": data.left_out,
+        "processing": data.processing,
+        "warnings": data.warnings,
         "notes": [_note(note) for note in recording.own_notes],
         "files": [
             {
@@ -112,66 +178,45 @@ def report_data(recording: Recording) -> dict[str, Any]:
             for origin in recording.origins
         ],
     }
-    finite: dict[str, Any] = _finite(data)
-    return finite
+    return (json.dumps(_finite(members), indent=1, allow_nan=False) + "\n").encode()
 
 
-def json_bytes(data: dict[str, Any]) -> bytes:
-    """Return the content of ``report.json``."""
-    return (json.dumps(data, indent=1, allow_nan=False) + "\n").encode()
+def criterion_members(entry: ReportCriterion) -> dict[str, object]:
+    """Return a criterion as an object of ``report.json``.
 
-
-def criteria_data(recording: Recording) -> list[dict[str, Any]]:
-    """Return the criteria of a recording with their budgets, as in ``report.json``.
-
-    None: an uncertainty that is not stated, and the margin of an upper bound or a count. The
-    uncertainty of a criterion lacks the contributions that are ``"excluded"``; ``"allowance"`` is
-    the largest standard uncertainty by them with which ``"verdict_if_stated"`` holds.
+    The uncertainty lacks the contributions that are ``"excluded"``; ``"allowance"`` is the largest
+    standard uncertainty by them with which ``"verdict_if_stated"`` holds.
     """
-    verdict = recording.assess()
-    average = recording.average()
-    count = len(average.level)
-    standard = [(lower, upper) for *_, lower, upper in LIMITS[verdict.source]]
-    spreads = {
-        name: _spread(getattr(drop, name).value for drop in recording.drops)
-        for name in ("contact_time", "restitution")
+    criterion, estimate = entry.criterion, entry.criterion.estimate
+    band = criterion.name.removeprefix("octave_").replace("_", ".")
+    members = {
+        "name": criterion.name,
+        "unit": criterion.unit,
+        "band": float(band) if criterion.unit == "dB" else None,
+        "value": criterion.value,
+        "uncertainty": estimate.uncertainty if estimate.contributions else None,
+        "freedom": estimate.freedom,
+        "coverage_factor": estimate.coverage_factor,
+        "expanded_uncertainty": entry.expanded,
+        "excluded": [*entry.excluded],
+        "verdict_if_stated": criterion.conforms_if_stated,
+        "allowance": criterion.allowance,
+        "upper_bound": estimate.upper_bound,
+        "lower": criterion.lower,
+        "upper": criterion.upper,
+        "limits_of_standard": not entry.has_own_limits,
+        "margin": entry.margin,
+        "probability": criterion.probability,
+        "verdict": criterion.conforms,
+        "spread": entry.spread,
+        "background": entry.background,
+        "flag": entry.flag,
+        "contributions": [
+            {**vars(part), "kind": part.kind, "sensitivity": part.sensitivity}
+            for part in estimate.contributions
+        ],
     }
-    rows = []
-    for i, (criterion, default) in enumerate(zip(verdict.criteria, standard, strict=True)):
-        is_level, estimate = i < count, criterion.estimate
-        has_budget = bool(estimate.contributions)
-        limits = criterion.lower, criterion.upper
-        is_count = criterion.lower == criterion.upper
-        rows.append(
-            {
-                "name": criterion.name,
-                "unit": criterion.unit,
-                "band": float(get_bands().nominal[i]) if is_level else None,
-                "value": criterion.value,
-                "uncertainty": estimate.uncertainty if has_budget else None,
-                "freedom": estimate.freedom,
-                "coverage_factor": estimate.coverage_factor,
-                "expanded_uncertainty": estimate.expanded if has_budget else None,
-                "excluded": _excluded(criterion),
-                "verdict_if_stated": criterion.conforms_if_stated,
-                "allowance": criterion.allowance,
-                "upper_bound": estimate.upper_bound,
-                "lower": criterion.lower,
-                "upper": criterion.upper,
-                "limits_of_standard": limits == default,
-                "margin": None if estimate.upper_bound or is_count else criterion.margin,
-                "probability": criterion.probability,
-                "verdict": criterion.conforms,
-                "spread": float(average.spread[i]) if is_level else spreads.get(criterion.name),
-                "background": float(average.background[i]) if is_level else None,
-                "flag": str(average.flag[i]) if is_level else "",
-                "contributions": [
-                    {**vars(part), "kind": part.kind, "sensitivity": part.sensitivity}
-                    for part in estimate.contributions
-                ],
-            }
-        )
-    return [_finite(row) for row in rows]
+    return {name: _finite(value) for name, value in members.items()}
 
 
 def _dates(texts: Iterable[str]) -> str:
@@ -184,29 +229,28 @@ def _dates(texts: Iterable[str]) -> str:
     return " to ".join(dict.fromkeys([days[0], days[-1]])) if days else ""
 
 
-def _excluded(criterion: Criterion) -> list[str]:
+def _excluded(criterion: Criterion) -> tuple[str, ...]:
     """Return the contributions that the uncertainty of a criterion should have, but lacks."""
     lacking = list(criterion.estimate.not_stated)
     names = {part.name for part in criterion.estimate.contributions}
     if NOISE in names and REPEATABILITY not in names:
         lacking.append(SCATTER)
-    return [] if math.isnan(criterion.value) else lacking
+    return () if math.isnan(criterion.value) else tuple(lacking)
 
 
-def missing_fields(config: Config, origins: Iterable[Origin]) -> list[str]:
-    """Return what ISO/IEC 17025 asks of a report and neither laboratory nor files have stated."""
+def missing_keys(config: Config, origins: Iterable[Origin]) -> list[str]:
+    """Return the keys of what ISO/IEC 17025 asks and neither laboratory nor files have stated."""
     stated = {**vars(config.report), **vars(config)}
     stated["date"] = config.date or any(origin.date for origin in origins)
-    missing = [title for key, title in FIELDS.items() if stated[key] in ("", (), None, False)]
-    certified = [item.certificate for item in config.instruments]
-    if not certified:
+    missing = [key for key in REQUIRED if stated[key] in ("", (), None, False)]
+    if not config.instruments:
         missing.append("instruments")
-    elif not all(certified):
-        missing.append("certificates of instruments")
+    elif not all(item.certificate for item in config.instruments):
+        missing.append("instruments: certificate")
     return missing
 
 
-def _levels(recording: Recording, bands: BandSet) -> dict[str, Any]:
+def _levels(recording: Recording, bands: BandSet) -> dict[str, object]:
     average = recording.average(bands)
     columns = ("background", "spread", "flag")
     return {
@@ -220,7 +264,7 @@ def _levels(recording: Recording, bands: BandSet) -> dict[str, Any]:
     }
 
 
-def _drop(drop: Drop) -> dict[str, Any]:
+def _drop(drop: Drop) -> dict[str, object]:
     return {
         "name": drop.name,
         "onset": drop.onset,
@@ -233,7 +277,7 @@ def _drop(drop: Drop) -> dict[str, Any]:
     }
 
 
-def _note(note: Note) -> dict[str, Any]:
+def _note(note: Note) -> dict[str, object]:
     return {**vars(note), "is_warning": note.is_warning, "message": note.message}
 
 
@@ -241,12 +285,12 @@ def _estimate(estimate: Estimate) -> dict[str, float]:
     return {"value": estimate.value, "uncertainty": estimate.uncertainty}
 
 
-def _spread(values: Iterable[float]) -> float:
-    known = [value for value in values if math.isfinite(value)]
+def _spread(recording: Recording, name: str) -> float:
+    known = [value for d in recording.drops if math.isfinite(value := getattr(d, name).value)]
     return float(np.std(known, ddof=1)) if len(known) > 1 else math.nan
 
 
-def _finite(value: Any) -> Any:  # noqa: ANN401 - of JSON
+def _finite(value: object) -> object:
     """Return a JSON value with None for numbers that are not finite."""
     if isinstance(value, dict):
         return {key: _finite(item) for key, item in value.items()}

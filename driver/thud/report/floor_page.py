@@ -9,13 +9,7 @@ import numpy as np
 
 from thud.base.bridge import version
 from thud.case.keys import humanize
-from thud.floors.description import (
-    CAVEAT,
-    rating_title,
-    remedy,
-    source_note,
-    verdict_text,
-)  # fmt: skip
+from thud.floors.description import CAVEAT, rating_title, remedy, source_note, verdict_text
 from thud.floors.resonances import floor_frequencies, resonances, room_frequencies
 from thud.level.rating import class_text
 from thud.plot.templates import render

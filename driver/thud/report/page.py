@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-from typing import TYPE_CHECKING, Any, NamedTuple
+import math
+from typing import TYPE_CHECKING, NamedTuple
 
+from thud.base.bridge import version
 from thud.level.levels import STANDARDS
 from thud.plot.templates import render
+from thud.recordings.checks.plate import check_plate
 from thud.recordings.recorded_levels import BACKGROUND
 from thud.report.contents import json_bytes
 from thud.report.rows import (
@@ -16,18 +19,22 @@ from thud.report.rows import (
     capital,
     criterion_row,
     drop_table,
+    entry_text,
     excluded_text,
     expanded_text,
     freedom_text,
     number,
-    quantity_of,
     reason_text,
-    value_text,
     width_text,
 )
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+
+    from thud.level.assessment import Criterion
+    from thud.recordings.config import Instrument, Properties
+    from thud.recordings.recording import Recording
+    from thud.report.contents import ReportCriterion, ReportData
 
 # Maximum number of characters of the name at the foot of each page.
 MAX_IDENTITY = 70
@@ -57,7 +64,7 @@ class RangePicture(NamedTuple):
 
 
 def report_page(
-    data: dict[str, Any],
+    data: ReportData,
     figures: Iterable[bytes] = (),
     mark: tuple[str, bytes] | None = None,
 ) -> str:
@@ -68,57 +75,60 @@ def report_page(
     page states the SHA-256 of ``report.json``.
     """
     checksum = hashlib.sha256(json_bytes(data)).hexdigest()
-    report, criteria = data["report"], data["criteria"]
-    name = data["serial"] or data["name"]
-    identity = f"Report {report['number'] or f'of {name}'}"
-    if len(identity) > MAX_IDENTITY or not report["number"]:
+    config, criteria = data.recording.config, data.criteria
+    report = config.report
+    name = config.serial or data.recording.name
+    identity = f"Report {report.number or f'of {name}'}"
+    if len(identity) > MAX_IDENTITY or not report.number:
         identity = f"{identity[:MAX_IDENTITY]}, SHA-256 {checksum[:16]}…"
     return render(
         "report/calibration.html",
-        title=f"Calibration report: {report['number'] or name}",
+        title=f"Calibration report: {report.number or name}",
         identity=identity,
+        version=version(),
         data=data,
+        report=report,
         checksum=checksum,
         mark=mark,
         reason=reason_text(criteria),
         about=_about(data),
-        measured=_measured(data),
+        measured=_measured(data.recording),
         head=HEAD,
-        rows=[(c, criterion_row(c), range_picture(c)) for c in criteria],
+        rows=[(e.criterion.conforms, criterion_row(e), range_picture(e)) for e in criteria],
         limits_x=LIMITS_X,
         excluded=excluded_text(criteria),
-        standards=STANDARDS.get(data["source"], "the standards"),
-        has_own_limits=any(not criterion["limits_of_standard"] for criterion in criteria),
+        standards=STANDARDS[data.verdict.source],
+        has_own_limits=any(entry.has_own_limits for entry in criteria),
         figures=[*figures],
-        drops=drop_table(data),
+        drops=drop_table(data.recording),
         budget_head=BUDGET_HEAD,
-        budgets=[_budget(c) for c in criteria if c["uncertainty"] and c["value"] is not None],
+        budgets=[*map(_budget, (e for e in criteria if _has_budget(e.criterion)))],
         without_budget=", ".join(
-            quantity_of(criterion).title
-            for criterion in criteria
-            if criterion["name"] != COUNT and not criterion["uncertainty"]
+            entry.criterion.quantity.title
+            for entry in criteria
+            if entry.criterion.name != COUNT and not entry.criterion.estimate.uncertainty
         ),
         methods=_methods(data),
-        properties=_properties(data["properties"]),
-        issued=", ".join(filter(None, [report["place"], report["issued"]])),
+        properties=_properties(config.properties),
+        issued=", ".join(filter(None, [report.place, report.issued])),
     )
 
 
-def _about(data: dict[str, Any]) -> dict[str, str]:
+def _about(data: ReportData) -> dict[str, str]:
     """Return what is stated of laboratory, client and item."""
-    report = data["report"]
+    config, report = data.recording.config, data.recording.config.report
     return _stated({
-        "Laboratory": data["laboratory"] or NOT_KNOWN,
-        "Address": "\n".join(report["address"]),
-        "Accreditation": report["accreditation"],
-        "Client": "\n".join(report["client"]),
-        "Ball": data["ball"] or NOT_KNOWN,
-        "Serial number": data["serial"] or NOT_KNOWN,
-        "Item": report["item"],
-        "State of the item": report["state"],
-        "Received on": report["received"],
-        "Measured on": data["date"] or NOT_KNOWN,
-        "Issued on": report["issued"],
+        "Laboratory": config.laboratory or NOT_KNOWN,
+        "Address": "\n".join(report.address),
+        "Accreditation": report.accreditation,
+        "Client": "\n".join(report.client),
+        "Ball": config.ball or NOT_KNOWN,
+        "Serial number": config.serial or NOT_KNOWN,
+        "Item": report.item,
+        "State of the item": report.state,
+        "Received on": report.received,
+        "Measured on": data.date or NOT_KNOWN,
+        "Issued on": report.issued,
     })  # fmt: skip
 
 
@@ -127,25 +137,27 @@ def _stated(pairs: dict[str, str]) -> dict[str, str]:
     return {name: text for name, text in pairs.items() if text}
 
 
-def _measured(data: dict[str, Any]) -> dict[str, str]:
+def _measured(recording: Recording) -> dict[str, str]:
     """Return what is stated on where, how and with what the drops were measured."""
-    files, drops, report = data["files"], len(data["drops"]), data["report"]
-    rates = sorted({file["sample_rate"] for file in files})
+    config, report, files = recording.config, recording.config.report, recording.origins
+    rates = sorted(file.sample_rate for file in files)
     range_text = " to ".join(dict.fromkeys(f"{rate / 1e3:.4g}" for rate in (rates[0], rates[-1])))
-    calibrations = dict.fromkeys(file["calibration"] for file in files if file["calibration"])
-    relative = data["calibration_uncertainty"]
+    calibrations = dict.fromkeys(file.calibration for file in files if file.calibration)
+    relative = recording.calibration_uncertainty
     uncertainty = "uncertainty not stated" if relative is None else f"u = {100 * relative:.2g} %"
-    pressure = report["pressure"]
-    amount = f"{_count(drops, 'drop')} in {_count(len(files), 'file')}, {range_text} kHz"
+    pressure = report.pressure
+    amount = f"{_count(len(recording.drops), 'drop')} in {_count(len(files), 'file')}"
     return _stated({
-        **{key.capitalize(): report[key] for key in ("place", "procedure", "deviations")},
-        "Temperature": _number_text(data["temperature"], 1, "°C") or NOT_KNOWN,
-        "Humidity": _number_text(report["humidity"], 0, "%"),
+        "Place": report.place,
+        "Procedure": report.procedure,
+        "Deviations": report.deviations,
+        "Temperature": _number_text(config.temperature, 1, "°C") or NOT_KNOWN,
+        "Humidity": _number_text(report.humidity, 0, "%"),
         "Air pressure": _number_text(pressure and pressure / 100, 0, "hPa"),
-        "Recordings": amount,
+        "Recordings": f"{amount}, {range_text} kHz",
         "Calibration": f"{'; '.join(calibrations) or NOT_KNOWN}; {uncertainty}",
-        "Instruments": "\n".join(map(_instrument, data["instruments"])) or NOT_KNOWN,
-        "Traceability": report["traceability"],
+        "Instruments": "\n".join(map(_instrument, config.instruments)) or NOT_KNOWN,
+        "Traceability": report.traceability,
     })  # fmt: skip
 
 
@@ -157,72 +169,76 @@ def _count(number_of: int, noun: str) -> str:
     return f"{number_of} {noun}{'s' * (number_of != 1)}"
 
 
-def _instrument(item: dict[str, str]) -> str:
+def _instrument(item: Instrument) -> str:
     """Return an instrument with its serial number, certificate and dates as text."""
-    certificate = "certificate " * bool(item["certificate"]) + item["certificate"]
-    if item["calibrated"]:
-        certificate = f"{certificate or 'calibrated'} of {item['calibrated']}"
-    parts = [item["name"], f"no. {item['serial']}" if item["serial"] else "", certificate]
-    return ", ".join(filter(None, [*parts, f"due {item['due']}" if item["due"] else ""]))
+    certificate = "certificate " * bool(item.certificate) + item.certificate
+    if item.calibrated:
+        certificate = f"{certificate or 'calibrated'} of {item.calibrated}"
+    parts = [item.name, f"no. {item.serial}" if item.serial else "", certificate]
+    return ", ".join(filter(None, [*parts, f"due {item.due}" if item.due else ""]))
 
 
-def _properties(properties: dict[str, Any]) -> list[str]:
+def _properties(properties: Properties) -> list[str]:
     """Return the stated properties of the ball, with the example of the standards."""
     lines = [
-        f"{name.replace('_', ' ')} {1e3 * properties[name]:.4g} mm (standards: {1e3 * example:g} "
+        f"{name.replace('_', ' ')} {1e3 * value:.4g} mm (standards: {1e3 * example:g} "
         "mm as an example, no tolerance)"
         for name, example in EXAMPLES.items()
-        if properties[name] is not None
+        if (value := getattr(properties, name)) is not None
     ]
-    lines += [f"{name} {properties[name]}" for name in ("hardness", "surface") if properties[name]]
-    temperature = _number_text(properties["temperature"], 1, "°C")
-    return [*lines, f"temperature {temperature}"] if temperature else lines
+    stated = {"hardness": properties.hardness, "surface": properties.surface}
+    stated["temperature"] = _number_text(properties.temperature, 1, "°C")
+    return [*lines, *(f"{name} {text}" for name, text in stated.items() if text)]
 
 
-def _budget(criterion: dict[str, Any]) -> tuple[str, list[tuple[str, ...]]]:
+def _has_budget(criterion: Criterion) -> bool:
+    """Whether value and uncertainty of a criterion are known."""
+    return bool(criterion.estimate.uncertainty) and not math.isnan(criterion.value)
+
+
+def _budget(entry: ReportCriterion) -> tuple[str, list[tuple[str, ...]]]:
     """Return summary and contributions of the uncertainty budget of a criterion."""
-    combined = criterion["uncertainty"]
-    quantity = quantity_of(criterion)
+    estimate, quantity = entry.criterion.estimate, entry.criterion.quantity
     unit, scale = quantity.display_unit, quantity.display_scale
 
     def with_unit(value: float, unit: str) -> str:
         return f"{width_text(value)} {unit}".rstrip()
 
-    result = f"{value_text(criterion)} ± {expanded_text(criterion)} {unit}".rstrip()
+    result = f"{entry_text(entry)} ± {expanded_text(entry)} {unit}".rstrip()
     summary = "; ".join(
         [
             f"{capital(quantity.title)}: {result}",
-            f"u = {with_unit(combined * scale, unit)}",
-            f"degrees of freedom {freedom_text(criterion['freedom'])}",
-            f"k = {number(criterion['coverage_factor'], 2)}",
+            f"u = {with_unit(estimate.uncertainty * scale, unit)}",
+            f"degrees of freedom {freedom_text(estimate.freedom)}",
+            f"k = {number(estimate.coverage_factor, 2)}",
         ]
     )
     rows: list[tuple[str, ...]] = []
-    for part in criterion["contributions"]:
-        share = ((part["uncertainty"] or 0.0) / combined) ** 2
-        if share < MIN_SHARE:
+    for part in estimate.contributions:
+        share = (part.uncertainty / estimate.uncertainty) ** 2
+        if not share >= MIN_SHARE:
             continue
-        size, sensitivity = with_unit(part["uncertainty"] * part["divisor"] * scale, unit), "1"
-        if part["size"] is not None:
-            size = with_unit(part["size"], part["unit"])
-            per = f"/{part['unit']}" if part["unit"] else ""
-            sensitivity = with_unit(part["sensitivity"] * scale, f"{unit}{per}")
+        size, sensitivity = with_unit(part.uncertainty * part.divisor * scale, unit), "1"
+        if not math.isnan(part.size):
+            size = with_unit(part.size, part.unit)
+            per = f"/{part.unit}" if part.unit else ""
+            sensitivity = with_unit(part.sensitivity * scale, f"{unit}{per}")
         rows.append((
-            part["name"], part["kind"], size, f"{part['divisor']:.4g}", sensitivity,
-            with_unit(part["uncertainty"] * scale, unit), freedom_text(part["freedom"]),
-            f"{100 * share:.1f} %" if part["counted"] else "included",
+            part.name, part.kind, size, f"{part.divisor:.4g}", sensitivity,
+            with_unit(part.uncertainty * scale, unit), freedom_text(part.freedom),
+            f"{100 * share:.1f} %" if part.counted else "included",
         ))  # fmt: skip
     return summary, rows
 
 
-def range_picture(criterion: dict[str, Any]) -> RangePicture | None:
+def range_picture(entry: ReportCriterion) -> RangePicture | None:
     """Return the picture of a criterion; None for a count or an unknown value."""
-    lower, upper, value = (criterion[name] for name in ("lower", "upper", "value"))
-    if value is None or lower == upper:
+    lower, upper, value = entry.criterion.lower, entry.criterion.upper, entry.criterion.value
+    if math.isnan(value) or lower == upper:
         return None
     scale = (LIMITS_X[1] - LIMITS_X[0]) / (upper - lower)
     position = LIMITS_X[0] + scale * (value - lower)
-    half_width = scale * (criterion["expanded_uncertainty"] or 0.0)
+    half_width = scale * (entry.expanded if math.isfinite(entry.expanded) else 0.0)
     left, right = ENDS_X
     low, high = (
         min(max(end, left - 1), right + 1) for end in (position - half_width, position + half_width)
@@ -231,22 +247,24 @@ def range_picture(criterion: dict[str, Any]) -> RangePicture | None:
     return RangePicture(min(max(position, left), right), low, high, side)
 
 
-def _methods(data: dict[str, Any]) -> Iterable[str]:
+def _methods(data: ReportData) -> Iterable[str]:
     """Yield how levels, plate and outliers were treated."""
-    drops, low, high = data["drops"], *BACKGROUND
+    recording = data.recording
+    drops, low, high = recording.drops, *BACKGROUND
     averaged = "energy average of the drops" if len(drops) > 1 else "of one drop"
     yield (
         f"levels: {averaged}, method exact (band energy of the force from first touch to release, "
         "with a margin for their uncertainty; zero outside)"
     )
-    flags = {entry["flag"] for entry in data["criteria"]}
+    flags = {entry.flag for entry in data.criteria}
     if "corrected" in flags:
         yield f"levels {low:g} to {high:g} dB above the background were corrected for it"
     if "background" in flags:
         yield f"levels less than {low:g} dB above the background are upper bounds"
-    if met := [check["reason"] for check in data["plate"] if check["met"]]:
+    checks = check_plate(recording.config.plate).values()
+    if met := [str(note) for is_met, note in checks if is_met]:
         yield f"force plate: {'; '.join(met)}"
-    outliers = {note["subject"] for note in data["notes"] if note["code"] == "outlier"}
+    outliers = {note.subject for note in recording.outliers}
     if outliers:
         yield (
             f"{_count(len(outliers), 'outlier')} (Grubbs, 5 %), marked but not excluded: all "

@@ -65,7 +65,7 @@ _REQUIRED = ("required", "rating")
 
 
 class Change(NamedTuple):
-    """A change of floor or room, and the change of the rating, dB; NaN if it is not allowed."""
+    """A change of floor or room, and the change of the rating, dB."""
 
     text: str
     difference: float
@@ -175,19 +175,16 @@ class PredictedFloor:
 
     @cached_property
     def changes(self) -> tuple[Change, ...]:
-        """Changes of the rating by changes of floor and room, each predicted again."""
+        """Changes of the rating by those that the floor allows, predicted again; largest first."""
         now, result = self.prediction, []
         for text, of_floor, of_room in _variants(now.floor, now.room):
             try:
                 floor, room = replace(now.floor, **of_floor), replace(now.room, **of_room)
                 changed = predict_level(now.source, floor, room)
-                difference = changed.rating.level - now.rating.level
             except ThudError:
-                difference = np.nan
-            result.append(Change(text, difference))
-        # The largest effect first; changes that are not allowed last.
-        result.sort(key=lambda change: (np.isnan(change.difference), -abs(change.difference)))
-        return tuple(result)
+                continue
+            result.append(Change(text, changed.rating.level - now.rating.level))
+        return tuple(sorted(result, key=lambda change: -abs(change.difference)))
 
     def columns(self) -> dict[str, tuple[Array, str]]:
         """Return the levels in bands, and what they follow from; NaN where edges do not matter."""
@@ -216,8 +213,6 @@ class PredictedFloor:
 
 def difference_text(change: Change) -> str:
     """Return the change of a rating, dB, with its sign."""
-    if np.isnan(change.difference):
-        return "not allowed"
     return f"{change.difference:+z.1f}".replace("-", "−")
 
 

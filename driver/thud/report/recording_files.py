@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import json
-import warnings
+import math
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from thud.base._schema import VERDICTS
 from thud.base.bridge import version
 from thud.base.checks import refuse, require_kind, shown_text
 from thud.base.display import draw_all, warn_if_not_drawn
-from thud.base.errors import ReportWarning
-from thud.base.files import Results, require_regular
+from thud.base.files import Results
 from thud.base.tables import csv_text
+from thud.level.levels import BANDWIDTHS, get_bands
 from thud.recordings.recording import Recording
-from thud.report.contents import FORMAT, json_bytes, report_data
+from thud.report.contents import criterion_members, json_bytes, report_data
 from thud.report.rows import HEAD, criterion_row, reason_text
 
 if TYPE_CHECKING:
@@ -24,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from thud.recordings.measured_drop import Stages
+    from thud.report.contents import ReportCriterion, ReportData
 
 # Columns of the page that the printed table has.
 _SHOWN = ("Criterion", "Value", "U (95 %)", "Limits", "Margin", "Verdict")
@@ -36,50 +36,49 @@ PICTURES = {".svg": "image/svg+xml", ".png": "image/png", ".jpg": "image/jpeg"}
 MAX_PICTURE = 300_000
 
 
-def table(criteria: Sequence[dict[str, Any]]) -> list[tuple[str, ...]]:
+def table(criteria: Sequence[ReportCriterion]) -> list[tuple[str, ...]]:
     """Return the criteria of a report as rows of text, without the columns of the page alone."""
     shown = [i for i, title in enumerate(HEAD) if title in _SHOWN]
     return [tuple(row[i] for i in shown) for row in (HEAD, *map(criterion_row, criteria))]
 
 
-def verdict_text(data: dict[str, Any]) -> str:
+def verdict_text(data: ReportData) -> str:
     """Return the verdict of a report with its reason and a note on own limits."""
-    verdict, criteria = data["verdict"], data["criteria"]
+    verdict = data.verdict.conforms
     is_undecided = verdict == VERDICTS[2]
     subject, relation = ("The result is", "by") if is_undecided else ("The source", "to")
-    limits = f"the limits of the {data['source'].replace('_', ' ')}"
-    has_own_limits = any(not criterion["limits_of_standard"] for criterion in criteria)
+    limits = f"the limits of the {data.verdict.source.replace('_', ' ')}"
+    has_own_limits = any(entry.has_own_limits for entry in data.criteria)
     note = " Limits marked * are those of the laboratory." if has_own_limits else ""
     result = f"{subject} {verdict} {relation} {limits} at 95 %"
-    return f"{result}: {reason_text(criteria)}.{note}"
+    return f"{result}: {reason_text(data.criteria)}.{note}"
 
 
-def levels_csv(data: dict[str, Any]) -> str:
-    """Return the levels of a report in all bands, with uncertainties and background, as CSV."""
-    columns = {
-        "nominal_Hz": "band",
-        "level_dB": "level",
-        "standard_uncertainty_dB": "uncertainty",
-        "expanded_dB": "expanded_uncertainty",
-        "background_dB": "background",
-        "spread_dB": "spread",
-        "flag": "flag",
-    }
-    rows = [
-        (bands, *row)
-        for bands, levels in data["levels"].items()
-        for row in zip(*(levels[key] for key in columns.values()), strict=True)
-    ]
-    return csv_text([("bandwidth", *columns), *rows])
-
-
-def criteria_csv(data: dict[str, Any]) -> str:
-    """Return value, uncertainty, limits and verdict of each criterion of a report as CSV."""
-    keys = (
-        "name", "unit", "value", "upper_bound", "expanded_uncertainty", "lower", "upper", "margin",
-        "verdict",
+def levels_csv(recording: Recording) -> str:
+    """Return the levels in all bands, with uncertainties and background, as CSV."""
+    head = (
+        "bandwidth", "nominal_Hz", "level_dB", "standard_uncertainty_dB", "expanded_dB",
+        "background_dB", "spread_dB", "flag",
     )  # fmt: skip
-    rows = [[criterion[key] for key in keys] for criterion in data["criteria"]]
+    rows: list[Sequence[object]] = [head]
+    for bands in BANDWIDTHS:
+        average = recording.average(bands)
+        columns = (
+            get_bands(bands).nominal, average.level, [e.uncertainty for e in average.estimates],
+            [e.expanded for e in average.estimates], average.background, average.spread,
+        )  # fmt: skip
+        cells = [
+            [v if math.isfinite(v) else None for v in map(float, values)] for values in columns
+        ]
+        rows += [(bands, *row) for row in zip(*cells, average.flag, strict=True)]
+    return csv_text(rows)
+
+
+def criteria_csv(data: ReportData) -> str:
+    """Return value, uncertainty, limits and verdict of each criterion of a report as CSV."""
+    members = [criterion_members(entry) for entry in data.criteria]
+    keys = [key for key, value in members[0].items() if not isinstance(value, list)]
+    rows = [[row[key] for key in keys] for row in members]
     comment = f"# thud {version()}; SI units, levels in dB re 1 N, 1 s; uncertainties for 95 %\n"
     return comment + csv_text([keys, *rows])
 
@@ -117,17 +116,15 @@ def write_report(
     Warns
     -----
     ReportWarning
-        If a file is not written because an extra is missing, a font is missing, or the report of
-        another recording is replaced.
+        If a file is not written because an extra is missing, or a font is missing.
     """
     require_kind("recording", recording, Recording)
     results = Results(Path(directory), "measure", replace=replace)
-    return save(recording, report_data(recording), results)
+    return save(report_data(recording), results)
 
 
 def save(
-    recording: Recording,
-    data: dict[str, Any],
+    data: ReportData,
     results: Results,
     *,
     figures: bool = True,
@@ -138,47 +135,32 @@ def save(
     `data` is the result of `report_data`. With the stages of a drop, they are drawn too. For
     errors and warnings see `write_report`.
     """
-    folder = results.folder
     contents = {
-        LEVELS: levels_csv(data).encode(),
+        LEVELS: levels_csv(data.recording).encode(),
         CRITERIA: criteria_csv(data).encode(),
         JSON: json_bytes(data),
     }
-    if figures and _can_draw():
-        drawings = draw_figures(recording)
-        contents |= page_contents(recording, data, drawings, folder) | drawings
+    if figures and (drawings := draw_figures(data.recording)):
+        contents |= page_contents(data, drawings, results.folder) | drawings
     if stages:
         from thud.plot.save_figures import figure_files
 
         contents |= figure_files({STAGES: stages.plot()})
-    earlier = _checksums_in(folder)
-    paths = results.write(contents)
-    if earlier not in (None, [file["sha256"] for file in data["files"]]):
-        message = f"{folder}: replaces the results of another recording"
-        warnings.warn(message, ReportWarning, stacklevel=3)
-    return paths
-
-
-def _can_draw() -> bool:
-    """Whether matplotlib can be imported; warn if it is damaged, as levels do not depend on it."""
-    with warn_if_not_drawn(HTML):
-        import thud.plot  # noqa: F401 - slow
-
-        return True
-    return False
+    return results.write(contents)
 
 
 def draw_figures(recording: Recording) -> dict[str, bytes]:
     """Return the figures of a recording as SVG, by file name; warn of those not drawn."""
-    # Matplotlib is slow to import.
-    from thud.plot.save_figures import figure_files
+    # A damaged matplotlib, which is slow to import, leaves levels and data as they are.
+    with warn_if_not_drawn(HTML):
+        from thud.plot.save_figures import figure_files
 
-    return figure_files(draw_all({name: partial(recording.plot, kind=name) for name in FIGURES}))
+        draws = draw_all({name: partial(recording.plot, kind=name) for name in FIGURES})
+        return figure_files(draws)
+    return {}
 
 
-def page_contents(
-    recording: Recording, data: dict[str, Any], drawings: dict[str, bytes], folder: Path
-) -> dict[str, bytes]:
+def page_contents(data: ReportData, drawings: dict[str, bytes], folder: Path) -> dict[str, bytes]:
     """Return the page as HTML and, if possible, PDF, by file name.
 
     `drawings` are the figures as SVG. Warn if there is no PDF, or no font for some characters;
@@ -187,7 +169,7 @@ def page_contents(
     from thud.report.page import report_page
     from thud.report.pdf import pdf_file
 
-    mark = recording.config.report.accreditation_mark
+    mark = data.recording.config.report.accreditation_mark
     page = report_page(data, drawings.values(), read_picture(Path(mark)) if mark else None)
     return {HTML: page.encode(), **pdf_file(page, PDF, folder)}
 
@@ -205,12 +187,3 @@ def read_picture(path: Path) -> tuple[str, bytes]:
     if not kind or not content:
         refuse(f"{problem} ({'too large or empty' if kind else 'no picture'})", allowed)
     return kind, content
-
-
-def _checksums_in(folder: Path) -> list[str] | None:
-    """Return the checksums of the files of an earlier report; None if there is none."""
-    try:
-        data = json.loads(require_regular(folder / JSON).read_bytes())
-        return [file["sha256"] for file in data["files"]] if data["format"] == FORMAT else None
-    except (OSError, ValueError, RecursionError, KeyError, TypeError):
-        return None
