@@ -314,21 +314,3 @@ def test_case_without_floor_names_no_model(errors_of: ErrorsOf, tmp_path: Path) 
     message = errors_of("floor", tmp_path / "bare.nml")
     assert "no &floor and no &room; allowed: cases with &floor and &room" in message
     assert "&model" not in message
-
-
-def test_results_of_floors_and_rooms_have_the_forms_of_all(found: thud.FloorComparison) -> None:
-    below = found.predictions["thin"]
-    floor = thud.mobility(thud.Oscillator(), np.geomspace(20.0, 800.0, 30))
-    sound = thud.listen(below)
-    for result in (
-        found, below, thud.modal_room(below), floor, thud.fit_mobility(floor, order=2),
-        thud.ball_impedance(thud.solve(model="hollow_sphere"), [1e5, 1e6]),
-        thud.tapping_level("concrete 180"), sound, sound.sounds[0],
-        thud.blocked_force(below.source),
-    ):  # fmt: skip
-        assert re.fullmatch(f"<{type(result).__name__}[ :].*>", repr(result))
-        table, data = result.to_dataframe(), result.to_xarray()
-        assert len(table.columns) == len(data.variables)
-        assert all("units" in entry.attrs for entry in data.variables.values())
-        assert result.plot().axes
-        assert "</table>" in result._repr_html_()

@@ -18,7 +18,6 @@ from thud.base._schema import QUANTITIES
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from conftest import CaseFile, Run
 
@@ -230,10 +229,7 @@ def test_floors_that_cannot_be_are_refused(
         thud.mobility(kind(**keys), [50.0])
 
 
-def test_result_on_a_floor_is_shown(moved: thud.FloorImpact, tmp_path: Path) -> None:
-    assert "infinite_plate" in repr(moved)
-    assert len(moved.rows()) == 6
-    assert "contact, dB" in moved._repr_html_()
+def test_result_on_a_floor_is_shown(moved: thud.FloorImpact) -> None:
     figure = moved.plot()
     # The mobility is drawn over the bands.
     bands = thud.get_bands("third")
@@ -243,7 +239,6 @@ def test_result_on_a_floor_is_shown(moved: thud.FloorImpact, tmp_path: Path) -> 
     assert [axes.get_ylabel().split("\n")[0] for axes in figure.axes] == [
         "Force on the", "Velocity of", "Contact −", "Energy into", "Mobility $Y$,",
     ]  # fmt: skip
-    thud.plot.save(figure, tmp_path / "floor.png")
     dataset = moved.to_xarray()
     assert dataset["floor_velocity"].attrs["units"] == "m/s"
     assert float(dataset["floor_work"]) == moved.floor_work

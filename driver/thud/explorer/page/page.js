@@ -95,11 +95,11 @@ export function rounded(value, unit = "") {
   return typeof value === "number" ? `${digits(value, unit)} ${unit}`.trim() : digits(value);
 }
 
-/** Return a number with its sign: levels with `decimals` decimals, others with two digits. */
+/** Return a number with its sign, which zero has not: levels with `decimals`, others two digits. */
 export function signed(value, unit = "", decimals = 2) {
   const size = Math.abs(value);
   const text = unit === "dB" ? size.toFixed(decimals) : String(Number(size.toPrecision(2)));
-  if (!Number(text)) return `±${text}`;
+  if (!Number(text)) return text;
   return `${value < 0 ? "−" : "+"}${text}`;
 }
 
