@@ -62,15 +62,6 @@ def test_names_and_cells_are_no_code() -> None:
     assert plots(page)[0]["curves"][0]["name"] == "</script><b>"
 
 
-def test_page_suits_narrow_screens_and_dark_ones() -> None:
-    page = COMPARISON.html()
-    assert '<meta name="viewport" content="width=device-width' in page
-    assert "prefers-color-scheme: dark" in page
-    assert "minmax(min(100%," in page
-    assert "data:text/javascript;base64," in page
-    assert len(page) < 200_000
-
-
 @pytest.mark.parametrize("count", [1, 3, 9])
 def test_picture_is_a_column_wide_for_any_number_of_cases(count: int) -> None:
     names = [f"a_case_with_a_name_that_is_rather_long_{i}" for i in range(count)]

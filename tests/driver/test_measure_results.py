@@ -115,15 +115,6 @@ def test_levels_and_criteria_agree_on_uncertainty(noisy: thud.Recording, tmp_pat
     assert min(found) > 0.086
 
 
-def test_uncertainty_that_nobody_states_is_empty_and_not_zero(
-    noisy: thud.Recording, tmp_path: Path
-) -> None:
-    recording_files.save(report_data(noisy), Results(tmp_path, "measure"), figures=False)
-    decisions = noisy.assess().criteria
-    for row, one in zip(rows_of(tmp_path / "criteria.csv"), decisions, strict=True):
-        assert bool(row["expanded_uncertainty"]) == bool(one.estimate.contributions), one.name
-
-
 @pytest.mark.usefixtures("working_directory")
 def test_report_of_another_recording_does_not_stay_beside_new_numbers(
     tmp_path: Path, errors_of: ErrorsOf

@@ -68,11 +68,6 @@ def test_useless_impacts_are_refused() -> None:
         thud.plot.levels({"ball": 1})  # type: ignore[dict-item]
 
 
-def test_names_are_no_formulas(tmp_path: Path) -> None:
-    thud.plot.save(thud.plot.levels({"$x^{$": thud.solve()}), f"{tmp_path}/levels.png")
-    assert (tmp_path / "levels.png").exists()
-
-
 def test_figures_are_a_column_wide_and_whole(tmp_path: Path) -> None:
     figure = thud.plot.levels({"a": thud.solve(), "b": thud.solve(drop=thud.Drop(0.1))}, "floor")
     assert figure.get_figwidth() == pytest.approx(WIDTH)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import thud
-from thud.plot.style import RATING_SYMBOL, WIDTH
+from thud.plot.style import RATING_SYMBOL
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -123,15 +123,6 @@ def test_figure_says_what_lines_and_shades_are(others: dict[str, Any], expected:
     figure = draw(parameters={"height": HEIGHTS, **others})
     assert expected in words(figure)
     assert "tolerances of the octaves, ±1 to ±2 dB" in words(figure)
-
-
-def test_figure_is_a_column_wide(tmp_path: Any) -> None:  # noqa: ANN401 - a path
-    values = ["momentum_balance", "retarding", "conservative", "none"]
-    figure = draw(parameters={"momentum_flux": {"values": values}, "height": HEIGHTS})
-    assert figure.get_figwidth() == pytest.approx(WIDTH)
-    thud.plot.save(figure, tmp_path / "sweep.png")
-    titles = [axes.title.get_window_extent() for axes in figure.axes]
-    assert titles[0].x1 < titles[1].x0
 
 
 def test_case_with_a_room_is_drawn(tmp_path: Path) -> None:

@@ -139,6 +139,7 @@ def _draw_levels(fitted: FittedTarget, scale: float, above: Axes, below: list[Ax
         axes.set_ylabel("(Fit − target)\n/ uncertainty")
 
 
+@own_style()
 def draw_compression_fit(fit: CompressionFit, ax: Axes | None = None) -> Figure:
     """Draw the measured curve from first touch on, and that of the model."""
     deflection = fit.deflection - fit.values["touch"]
