@@ -103,15 +103,12 @@ from .level.rating import (
 from .recordings.recording import Recording as Recording, read_recording as read_recording
 from .report.recording_files import write_report as write_report
 from .studies.calibrated_set import assess as assess
-from .studies.compression_fit import (
-    CompressionFit as CompressionFit,
-    fit_compression as fit_compression,
-)
 from .studies.design import (
     Design as Design,
     design as design,
 )
 from .studies.fit import fit as fit
+from .studies.fitting.compression_target import CompressionTarget as CompressionTarget
 from .studies.fitting.fit_result import Fit as Fit
 from .studies.fitting.force_target import ForceTarget as ForceTarget
 from .studies.fitting.level_target import LevelTarget as LevelTarget

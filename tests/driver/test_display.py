@@ -88,7 +88,9 @@ RESULTS: dict[Callable[[], Displayed], str] = {
     lambda: thud.sensitivity({**FIXED, "parameters": MASS, "design": {"size": 4}}): ".nc",
     lambda: thud.surrogate({**FIXED, "parameters": MASS, "design": {"size": 64}}): ".nc",
     lambda: thud.fit(thud.solve(model=LUMPED), ["mass"], thud.Case(model=LUMPED)): "",
-    lambda: thud.fit_compression(press().deflection, press().force): "",
+    lambda: thud.fit(
+        thud.CompressionTarget(press().deflection, press().force), ["youngs_modulus"]
+    ): "",
 }
 # Numbers and definitions that have no figure.
 WITHOUT_FIGURE = (thud.Rating, thud.Bands)

@@ -13,7 +13,7 @@ from scipy import stats
 
 import thud
 from thud.case.keys import with_values
-from thud.studies.fitting import search
+from thud.studies.fitting import force_target, search
 from thud.studies.fitting.inference import infer, worst_directions
 from thud.studies.fitting.ranges import Range, bound_parameters, get_ranges
 
@@ -96,7 +96,7 @@ def test_finite_element_loss_factor_from_noisy_force() -> None:
     case = thud.Case(model=COARSE)
     truth = {"youngs_modulus": 2.08e6, "loss_factor": 0.25}
     record = noisy_record(thud.solve(with_values(case, truth)), 5.0, seed=1)
-    fit = thud.fit(thud.ForceTarget(record, offset=False), list(truth), case)
+    fit = thud.fit(thud.ForceTarget(record), list(truth), case)
     for name, value in truth.items():
         # A miss by four standard errors has a probability of 6e-5.
         assert abs(fit.values[name] - value) < 4 * fit.standard_errors[name]
@@ -267,29 +267,9 @@ def test_search_starts_where_record_and_impact_correlate(at: float) -> None:
     time = np.arange(int(0.2 * RATE)) / RATE
     force = np.interp(time - at, impact.time, impact.floor_force, left=0, right=0)
     target = thud.ForceTarget((time + 3.0, force), window=(3.0, 3.2)).compare()
-    (start,) = target.own_start(impact)
+    (start,) = target.start(impact)
     # Sixteen places for each of 250 frequencies; a pulse that is cut is found to a millisecond.
     assert start == pytest.approx(3 + at, abs=0.2 / 250 / 16 if at > 0 else 1e-3)
-
-
-def test_derivatives_by_time_and_gain_are_those_of_the_residual() -> None:
-    impact = thud.solve(replace(TRUTH, sampling=thud.Sampling(duration=0.03)))
-    time = np.arange(int(0.1 * RATE)) / RATE
-    force = np.interp(time - 0.02, impact.time, impact.floor_force, left=0, right=0)
-    target = thud.ForceTarget((time, 1.1 * force), noise=2.0, gain=0.05).compare()
-    place = np.array([0.0201, 1.08])
-    steps = np.diag([1e-7, 1e-5])
-    slopes = [
-        (target.residual(impact, place + step) - target.residual(impact, place - step)) / step.max()
-        for step in steps
-    ]  # fmt: skip
-    found = target.own_derivatives(impact, place)
-    np.testing.assert_allclose(found, np.transpose(slopes) / 2, rtol=1e-4, atol=1e-3)
-    # What is known of the gain is the last residual.
-    assert target.residual(impact, place)[-1] == pytest.approx((1.08 - 1) / 0.05)
-    assert target.weighted_target[-1] == pytest.approx(1 / 0.05)
-    # At the truth the samples are left, which lines between those of the impact make.
-    assert np.abs(target.residual(impact, np.array([0.02, 1.1]))[:-1]).max() < 0.1
 
 
 def test_noise_is_estimated_from_the_residuals() -> None:
@@ -323,7 +303,7 @@ def test_noise_is_estimated_from_the_residuals() -> None:
 def test_parameters_that_are_not_identifiable_are_named(
     parameters: dict[str, float], words: str
 ) -> None:
-    target = thud.ForceTarget(noisy_record(thud.solve(TRUTH), 5.0, 1), offset=False)
+    target = thud.ForceTarget(noisy_record(thud.solve(TRUTH), 5.0, 1))
     with pytest.warns(thud.FitWarning, match=words):
         fit = thud.fit(target, parameters, case=SHELL)
     others = set(fit.names) - {"time_shift"}
@@ -382,12 +362,12 @@ def test_contact_time_is_reported_between_samples() -> None:
 def test_model_that_cannot_follow_is_reported() -> None:
     record = noisy_record(thud.solve(MODAL), 5.0, 1)
     with pytest.warns(thud.FitWarning, match=naming("model", "force")):
-        thud.fit(thud.ForceTarget(record, offset=False), ["youngs_modulus"], case=SHELL)
+        thud.fit(thud.ForceTarget(record), ["youngs_modulus"], case=SHELL)
     with (
         pytest.warns(thud.FitWarning, match=naming("model", "force")),
         pytest.warns(thud.FitWarning, match=naming("uncertainty")),
     ):
-        thud.fit(thud.ForceTarget(record, noise=5.0, offset=False), ["youngs_modulus"], case=SHELL)
+        thud.fit(thud.ForceTarget(record, noise=5.0), ["youngs_modulus"], case=SHELL)
 
 
 @pytest.mark.parametrize(("low", "high", "limit"), [(1e6, 1.7e6, 1.7), (1.9e6, 3e6, 1.9)])
@@ -395,13 +375,13 @@ def test_limits_hold_and_are_reported(
     low: float, high: float, limit: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     limited = {"youngs_modulus": thud.Parameter((low + high) / 2, low, high)}
-    target, compute, asked = thud.solve(TRUTH), search.compute, []
+    target, compute, asked = thud.solve(TRUTH), force_target.compute, []
 
     def watched(case: thud.Case) -> thud.Impact:
         asked.append(case.ball.youngs_modulus)
         return compute(case)
 
-    monkeypatch.setattr(search, "compute", watched)
+    monkeypatch.setattr(force_target, "compute", watched)
     fit = quiet_fit(target, limited, case=SHELL)
     # Also of the differences that are the derivatives.
     assert low * (1 - 1e-12) <= min(asked) < max(asked) <= high * (1 + 1e-12)
@@ -438,7 +418,7 @@ def test_table_says_what_the_standard_deviations_are() -> None:
 def test_estimated_deviation_of_levels_is_that_of_their_residuals() -> None:
     levels = thud.solve(TRUTH).levels(force="floor") + 0.1 * np.eye(5)[0]
     fit = quiet_fit(thud.LevelTarget(levels), ["youngs_modulus"], case=SHELL)
-    rest = fit.targets[0].impact.levels(force="floor") - levels
+    rest = fit.result.levels(force="floor") - levels
     # Five levels, less one parameter.
     assert fit.noise == pytest.approx(np.sqrt(rest @ rest / 4))
     modulus, step = fit.values["youngs_modulus"], 1e2
@@ -455,7 +435,7 @@ def test_estimated_deviation_of_levels_is_that_of_their_residuals() -> None:
 @pytest.fixture
 def fail_where(monkeypatch: pytest.MonkeyPatch) -> FailWhere:
     """Let the model fail at some of the moduli, Pa."""
-    solve = search.compute
+    solve = force_target.compute
 
     def set_failures(fails: Callable[[float], bool]) -> None:
         def compute(case: thud.Case) -> thud.Impact:
@@ -464,7 +444,7 @@ def fail_where(monkeypatch: pytest.MonkeyPatch) -> FailWhere:
                 raise thud.NumericalError(message)
             return solve(case)
 
-        monkeypatch.setattr(search, "compute", compute)
+        monkeypatch.setattr(force_target, "compute", compute)
 
     return set_failures
 

@@ -122,9 +122,9 @@ def test_results_are_replaced_as_a_whole_and_others_on_demand_only(
     (tmp_path / "study.toml").write_text(f"{STUDY}height = {{}}\n")
     assert cli.main(both) == 0
     assert (tmp_path / "found/confidence.svg").exists()
-    # The same study with one parameter has no regions.
-    (tmp_path / "study.toml").write_text(STUDY.replace("[target]", "[target]\ntime_shift = false"))
-    np.savetxt("record.csv", np.loadtxt("record.csv", delimiter=",") - [0.2, 0], delimiter=",")
+    # A study of levels with one parameter has no regions.
+    levels = "levels = [39, 31, 23, 17, 12]"
+    (tmp_path / "study.toml").write_text(STUDY.replace('file = "record.csv"', levels))
     assert cli.main(both) == 0
     assert names_in(tmp_path / "found") == [
         "fit.csv", "fit.json", "fit.svg", "fitted.nml", "thud.txt",
@@ -174,7 +174,6 @@ def test_useless_directory_is_reported_before_the_search(
         ),
         ("[target]", "[target", naming("study.toml", "TOML")),
         ("[target]", "[target]\nnoise = 0", naming("noise", 0)),
-        ("[target]", "[target]\ntime_shift = 1", naming("time_shift", 1, "true", "false")),
         ("[target]", "[target]\nwindow = 3", naming("window", 3)),
         ('file = "record.csv"', "levels = [39]", naming("levels", [39], 5)),
         ('file = "record.csv"', "levels = []\nbands = []", naming("bands", [])),

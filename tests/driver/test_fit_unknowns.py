@@ -14,7 +14,7 @@ from conftest import SHELL, naming, quiet_fit
 import thud
 from thud.case.keys import with_values
 from thud.studies.fit import read_fit_study
-from thud.studies.fitting import search
+from thud.studies.fitting import force_target
 from thud.studies.fitting.alternatives import ORDERS, UNKNOWNS, alternatives
 from thud.studies.fitting.inference import posterior
 from thud.studies.fitting.residual_tests import misfit_ratio
@@ -143,7 +143,7 @@ def test_effect_of_clock_and_calibration_is_stated() -> None:
 
 
 def test_alternative_that_cannot_be_computed_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    compute = search.compute
+    compute = force_target.compute
 
     def fails(case: thud.Case) -> thud.Impact:
         if case.floor is not None:
@@ -152,7 +152,7 @@ def test_alternative_that_cannot_be_computed_is_named(monkeypatch: pytest.Monkey
         return compute(case)
 
     drop = record("as assumed", np.random.default_rng(1), 0.01)
-    monkeypatch.setattr(search, "compute", fails)
+    monkeypatch.setattr(force_target, "compute", fails)
     with pytest.warns(thud.FitWarning, match=naming("resistance", "out of the model")):
         thud.fit(drop, START, ASSUMED)
 

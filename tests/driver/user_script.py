@@ -40,9 +40,8 @@ ranges: list[thud.Criterion] = [one for one in likely.criteria if one.range]
 modes: thud.FreeModes = thud.free_modes(ball, thud.Modes(count=2).count)
 press = thud.Compression(gas="isothermal")
 pressed: thud.CompressionCurve = thud.compress(ball, "modal_ball", points=5, gas=press.gas)
-modulus_fit: thud.CompressionFit = thud.fit_compression(
-    pressed.deflection, pressed.force, ball, "modal_ball", gas=press.gas
-)
+pressed_target = thud.CompressionTarget(pressed.deflection, pressed.force, gas=press.gas)
+modulus_fit: thud.Fit = thud.fit(pressed_target, ["youngs_modulus"], thud.Case(ball=ball))
 bands: thud.Bands = thud.get_bands("third")
 thirds = thud.force_exposure_levels(flagship.floor_force, flagship.sample_rate, "third", "fft")
 limited = replace(case, limits=thud.Limits())

@@ -67,10 +67,7 @@ def calls() -> dict[str, Call]:
                 thud.predict_level(impact, PLATE, ROOM), balls=balls, microphones=microphones
             ),
         ),
-        "fit_compression": Call(
-            [pressed.deflection, pressed.force],
-            lambda *given: thud.fit_compression(*given, model="modal_ball"),
-        ),
+        "press": Call([pressed.deflection, pressed.force], thud.CompressionTarget),
         "recording": Call(
             [record],
             lambda force: thud.read_recording(

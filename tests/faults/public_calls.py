@@ -74,8 +74,10 @@ def fast_calls(folder: Path) -> Calls:
         "standardized_level": lambda: thud.standardized_level([65.0, 64.0], 0.6, 40.0),
         "read_room_levels": lambda: str(thud.read_room_levels(folder / "levels.csv", volume=40.0)),
         "compress": lambda: thud.compress(points=5).force,
-        "fit_compression": lambda: str(
-            thud.fit_compression(pressed.deflection, pressed.force, model="modal_ball")
+        "fit to a press": lambda: str(
+            thud.fit(
+                thud.CompressionTarget(pressed.deflection, pressed.force), ["youngs_modulus"]
+            ).values
         ),
         "read_case": lambda: str(thud.read_case(folder / "mine.nml")),
         "read_all": lambda: str(read_all([folder / "mine.nml"])),

@@ -24,7 +24,6 @@ from thud.floors.mobility_table import read_mobility
 from thud.floors.survey import rating_table, read_room_levels
 from thud.recordings.config import read_config
 from thud.recordings.formats.text import read_table
-from thud.studies.compression_fit import fit_compression
 from thud.studies.fitting.force_record import read_record, time_and_force
 
 if TYPE_CHECKING:
@@ -115,7 +114,8 @@ def _read_compression(path: Path, chance: random.Random) -> str:
     if table.shape[1] != 2 or chance.random() < 0.9:
         return ""
     try:
-        found = fit_compression(*table.T, thud.Ball(poisson_ratio=0.49), SMALL)
+        case = thud.Case(ball=thud.Ball(poisson_ratio=0.49), model=SMALL)
+        found = thud.fit(thud.CompressionTarget(*table.T), ["youngs_modulus"], case)
     except thud.ThudError as error:
         message = f"{path}: {error}"
         raise type(error)(message) from error

@@ -23,16 +23,14 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from thud.studies.compression_fit import CompressionFit
-
     Array = NDArray[np.float64]
     # What is added to the force, N, at relative positions.
     Disturbance = Callable[[Array, Array, np.random.Generator], Array]
 
 TRUE = thud.Ball(youngs_modulus=1.83e6)
-START = thud.Ball(youngs_modulus=3e6)
 # Coarse, and its own truth.
 MODEL = thud.ModalBall(rings=20)
+CASE = thud.Case(ball=thud.Ball(youngs_modulus=3e6), model=MODEL)
 TOUCH = 1.2e-3
 CONFIDENCE = 0.9
 ERRORS = 3.0
@@ -90,12 +88,13 @@ def curve_of(name: str, seed: int, white: float | None = None) -> tuple[Array, A
     return deflection, force + added + random.normal(size=len(force)) * size
 
 
-def quiet(curve: tuple[Array, Array], unknowns: Sequence[str] | None = None) -> CompressionFit:
+def quiet(curve: tuple[Array, Array], unknowns: Sequence[str] | None = None) -> thud.Fit:
     """Return a fit whose warnings do not matter."""
     options = {} if unknowns is None else {"unknowns": unknowns}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", thud.FitWarning)
-        return thud.fit_compression(*curve, START, MODEL, confidence=CONFIDENCE, **options)
+        target = thud.CompressionTarget(*curve, **options)
+        return thud.fit(target, ["youngs_modulus"], CASE, confidence=CONFIDENCE)
 
 
 class Tally(NamedTuple):
@@ -110,7 +109,7 @@ class Tally(NamedTuple):
     widths: Array
 
 
-def miss(fit: CompressionFit) -> float:
+def miss(fit: thud.Fit) -> float:
     """Return the error of the modulus over its standard error."""
     error = fit.values["youngs_modulus"] - TRUE.youngs_modulus
     return abs(error) / fit.standard_errors["youngs_modulus"]

@@ -13,22 +13,21 @@ import numpy as np
 from thud.base.checks import refuse
 from thud.base.errors import ThudError
 from thud.base.units import size_of
-from thud.case.case import Case, new_model
 from thud.case.keys import find_key, with_values
 from thud.explorer.answer import new_case
 from thud.explorer.models import MODEL_FACTS, facts_of
 from thud.explorer.recording import read_copies
 from thud.explorer.series import to_json
 from thud.recordings.formats.text import read_table
-from thud.studies.compression_fit import fit_compression
 from thud.studies.fit import fit
+from thud.studies.fitting.compression_target import CompressionTarget
 from thud.studies.fitting.force_target import ForceTarget
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
+    from thud.case.case import Case
     from thud.recordings.formats.text import Table
-    from thud.studies.compression_fit import CompressionFit
     from thud.studies.fitting.fit_result import Fit
 
     Values = dict[str, dict[str, Any]]
@@ -73,7 +72,7 @@ def _answer(
     values: Values,
     case: Case,
     best: Mapping[str, Any],
-    result: Fit | CompressionFit,
+    result: Fit,
     columns: Mapping[str, Any],
 ) -> Answer:
     """Return the values of a case with those of a fit, and what is known of its quality.
@@ -122,8 +121,8 @@ def fit_press(paths: Sequence[str], values: Values) -> Answer:
     try:
         # Warnings are part of the answer.
         with warnings.catch_warnings(action="ignore"):
-            model = new_model(case.model, {})
-            result = fit_compression(deflection[used], force[used], case.ball, model)
+            target = CompressionTarget(deflection[used], force[used])
+            result = fit(target, ["youngs_modulus"], case)
     except ThudError as error:
         raise error.within(name) from error
     best = {"youngs_modulus": result.values["youngs_modulus"]}

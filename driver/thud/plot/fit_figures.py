@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator, NullLocator, ScalarFormatter
 
 from thud.case.keys import humanize
-from thud.plot.ball_figures import compression
 from thud.plot.style import (
     BAND_NAMES,
     COLORS,
@@ -25,6 +23,7 @@ from thud.plot.style import (
     own_style,
     tolerance_boxes,
 )
+from thud.studies.fitting.compression_target import CompressionComparison
 from thud.studies.fitting.fit_report import file_ends
 from thud.studies.fitting.force_target import SHIFT, ForceComparison
 
@@ -32,7 +31,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from thud.studies.compression_fit import CompressionFit
     from thud.studies.fitting.fit_result import Fit, FittedTarget
     from thud.studies.fitting.level_target import LevelComparison
 
@@ -69,7 +67,9 @@ def target_and_fit(fit: Fit, ax: Axes | None = None, number: int = 1) -> Figure:
     above, *below = own_panels(ax, 3.6, 2, sharex=True, height_ratios=[2.2, 1])
     for axes in below:
         axes.axhline(0, color="0.45", linewidth=0.8)
-    draw = _draw_force if isinstance(target.comparison, ForceComparison) else _draw_levels
+    draw = {ForceComparison: _draw_force, CompressionComparison: _draw_press}.get(
+        type(target.comparison), _draw_levels
+    )
     draw(target, fit.deviation_of(target), above, below)
     figure_of(above).align_ylabels()
     return finish(above, ax)
@@ -78,7 +78,7 @@ def target_and_fit(fit: Fit, ax: Axes | None = None, number: int = 1) -> Figure:
 def _draw_force(fitted: FittedTarget, deviation: float, above: Axes, below: list[Axes]) -> None:
     """Draw record, fit with its background, and residual."""
     comparison = cast("ForceComparison", fitted.comparison)
-    column = comparison.columns(fitted.impact, fitted.own)
+    column = comparison.columns(fitted.result, fitted.own)
     time = 1e3 * column["time_s"]
     record, target = column["record_N"], column["target_N"]
     band = f"below {comparison.below / 1e3:.3g} kHz"
@@ -89,7 +89,7 @@ def _draw_force(fitted: FittedTarget, deviation: float, above: Axes, below: list
     )
     fit = column["model_N"] + column["background_N"]
     above.plot(time, fit / 1e3, color=COLORS[1], linestyle="--", linewidth=1.1, label="Fit")
-    contact, touch = fitted.impact.contact_time, comparison.own_value(SHIFT, fitted.own)
+    contact, touch = fitted.result.contact_time, comparison.own_value(SHIFT, fitted.own)
     begin, end = touch - BEFORE * contact, touch + (1 + AFTER) * contact
     above.set_xlim(
         1e3 * max(begin, comparison.record.time[0]), 1e3 * min(end, comparison.record.time[-1])
@@ -107,11 +107,27 @@ def _draw_force(fitted: FittedTarget, deviation: float, above: Axes, below: list
         above.fill_between([], [], color=GRAY, linewidth=0, label=f"Noise {band}, ±2σ")
 
 
+def _draw_press(fitted: FittedTarget, deviation: float, above: Axes, below: list[Axes]) -> None:
+    """Draw the curve of a press, that of the model with what the press adds, and the residual."""
+    column = {name: np.asarray(values) for name, values in fitted.columns().items()}
+    deflection = 1e3 * column["deflection_m"]
+    above.plot(deflection, column["force_N"], label="Measured", **curve_style(0, 1))
+    fit = column["model_N"] + column["effects_N"]
+    above.plot(deflection, fit, color=COLORS[1], linestyle="--", linewidth=1.1, label="Fit")
+    above.set_ylabel("Force, N")
+    [above, *below][-1].set_xlabel("Deflection, mm")
+    for axes in below:
+        axes.axhspan(-2 * deviation, 2 * deviation, color=GRAY, linewidth=0)
+        axes.plot(deflection, column["residual_N"], color=COLORS[6], linewidth=0.7)
+        axes.set_ylabel("Fit − target, N")
+        above.fill_between([], [], color=GRAY, linewidth=0, label="Noise, ±2σ")
+
+
 def _draw_levels(fitted: FittedTarget, scale: float, above: Axes, below: list[Axes]) -> None:
     """Draw levels with their uncertainty times a scale, and the residuals of all quantities."""
     comparison = cast("LevelComparison", fitted.comparison)
-    column = comparison.columns(fitted.impact, fitted.own)
-    residuals = comparison.residual(fitted.impact, fitted.own) / scale
+    column = comparison.columns(fitted.result, fitted.own)
+    residuals = comparison.residual(fitted.result, fitted.own) / scale
     names = [str(name).removesuffix(" Hz") for name in column["quantity"]]
     x = np.arange(len(names))
     count = sum(str(name).endswith(" Hz") for name in column["quantity"])
@@ -123,7 +139,7 @@ def _draw_levels(fitted: FittedTarget, scale: float, above: Axes, below: list[Ax
     label = "Standard deviation of the target"
     tolerance_boxes(above, target - half, target + half, label, "Target")
     above.plot(x[:count], model, label="Fit", **curve_style(1, 4))
-    above.set_ylabel(level_label(FORCE_NAMES[fitted.impact.assessed_force(comparison.force)]))
+    above.set_ylabel(level_label(FORCE_NAMES[fitted.result.assessed_force(comparison.force)]))
     lowest = [above, *below][-1]
     lowest.set_xticks(x, [WRAPPED_NAMES.get(name, name) for name in names], fontsize="small")
     lowest.xaxis.set_minor_locator(NullLocator())
@@ -137,15 +153,6 @@ def _draw_levels(fitted: FittedTarget, scale: float, above: Axes, below: list[Ax
         axes.plot(x, residuals, **curve_style(1, 4) | {"linestyle": "none"})
         axes.set_ylim(-limit, limit)
         axes.set_ylabel("(Fit − target)\n/ uncertainty")
-
-
-@own_style()
-def draw_compression_fit(fit: CompressionFit, ax: Axes | None = None) -> Figure:
-    """Draw the measured curve from first touch on, and that of the model."""
-    deflection = fit.deflection - fit.values["touch"]
-    shown = deflection >= 0
-    measured = replace(fit.curve, deflection=deflection[shown], force=fit.force[shown])
-    return compression({"measured": measured, "model": fit.curve}, ax)
 
 
 # Maximum number of parameters with confidence regions.

@@ -1,38 +1,61 @@
-"""Targets of fits as functions: weighted residuals of an impact, and checks of targets."""
+"""Targets of fits as functions: weighted residuals of a computed result, and checks of targets."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
 from thud.base.checks import refuse_value, require_number
 from thud.base.immutable import Immutable
+from thud.studies.fitting.residual_tests import size_warning
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from thud.impact.impact import Impact
+    from thud.base.note import Note
+    from thud.case.case import Case
     from thud.studies.arrays import Array
 
 
+# What a model computes.
+Result = TypeVar("Result")
 # Relative step of the central differences. Forces are smooth to 1e-13, but have kinks where an
 # instant enters or leaves the contact: steps of 1e-3 would cross these, steps of 1e-5 rarely do.
 # Derivatives are accurate to 1e-7 (3e-3 for intermittent contact with a rising loss factor).
 STEP = 2e-5
 
 
+class Own(NamedTuple):
+    """A parameter of one target alone, such as the time of first touch; SI units.
+
+    The search begins at `start` and divides it by `scale`. With a finite `deviation` it is known to
+    be normal about `start`.
+    """
+
+    unit: str
+    scale: float
+    start: float = 0.0
+    deviation: float = np.inf
+    low: float = -np.inf
+    high: float = np.inf
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Comparison(Immutable, ABC):
-    """How far an impact is from a target, in standard deviations.
+class Comparison(Immutable, ABC, Generic[Result]):
+    """How far what a model computes is from a target, in standard deviations.
 
     Attributes
     ----------
     unit : str
         Unit of an estimated standard deviation.
-    weighted_target : ndarray, shape (size,)
+    has_own_noise : bool
+        The noise follows from the residuals of a search: see `reweighted`.
+    has_alternatives : bool
+        The target may show alternatives to the case.
+    weighted_target : ndarray, shape (n,)
         The target over its standard deviation.
     known_noise : bool
         The standard deviations are known; else their common factor is estimated.
@@ -41,37 +64,87 @@ class Comparison(Immutable, ABC):
     unit_deviation : float
         Unit of the residuals: noise of forces, N; 1 for levels.
     absorbed : int
-        Number of nuisance parameters that were projected out of the residuals.
-    own : dict of str to tuple
-        Unit and scale of each parameter of this target alone, such as the time of first touch.
+        Number of nuisance parameters in the covariance of the noise.
+    own : dict of str to Own
+        Parameters of this target alone.
     step : float
         Relative step of the differences that are the derivatives of the residuals.
     """
 
     unit: ClassVar[str]
+    has_own_noise: ClassVar[bool] = False
+    has_alternatives: ClassVar[bool] = False
     weighted_target: Array
     known_noise: bool
     noise_freedom: int | None = None
     unit_deviation: float = 1.0
     absorbed: int = 0
-    own: dict[str, tuple[str, float]] = field(default_factory=dict)
+    own: dict[str, Own] = field(default_factory=dict)
     step: float = STEP
 
     @property
     def size(self) -> int:
-        """Number of residuals."""
-        return len(self.weighted_target)
+        """Number of residuals: data, and own parameters that are known to an extent."""
+        known = sum(np.isfinite(entry.deviation) for entry in self.own.values())
+        return len(self.weighted_target) + int(known)
 
     @abstractmethod
-    def residual(self, impact: Impact, own: Array) -> Array:
-        """Return model minus target over standard deviation, shape (size,)."""
+    def solve(self, case: Case) -> Result:
+        """Return what the model of a case computes."""
 
-    def excess(self, impact: Impact, own: Array, residual: Array) -> float:  # noqa: ARG002
+    def start(self, result: Result) -> Array:  # noqa: ARG002
+        """Return the values of the own parameters from which the search begins."""
+        return np.array([entry.start for entry in self.own.values()])
+
+    @abstractmethod
+    def misfit(self, result: Result, own: Array) -> Array:
+        """Return model minus target over standard deviation, shape (n,)."""
+
+    def residual(self, result: Result, own: Array) -> Array:
+        """Return `misfit`, and own parameters minus what is known of them, shape (size,)."""
+        known = [
+            (value - entry.start) / entry.deviation
+            for value, entry in zip(own, self.own.values(), strict=True)
+            if np.isfinite(entry.deviation)
+        ]
+        return np.concatenate([self.misfit(result, own), known])
+
+    def reweighted(
+        self,
+        result: Result,  # noqa: ARG002
+        own: Array,  # noqa: ARG002
+        jacobian: Array,  # noqa: ARG002
+    ) -> Comparison[Result]:
+        """Return the comparison with the noise that the best residuals show, or itself."""
+        return self
+
+    def is_exact(self, result: Result, own: Array) -> bool:  # noqa: ARG002
+        """Return whether residuals are too small to be tested: numerical errors."""
+        return False
+
+    def warnings(
+        self,
+        result: Result,  # noqa: ARG002
+        own: Array,  # noqa: ARG002
+        residual: Array,
+        freedom: float,
+        unit: float,  # noqa: ARG002
+    ) -> list[Note]:
+        """Return warnings where residuals of unit variance are not noise.
+
+        `freedom` is the number of residuals less that of parameters, `unit` the standard deviation
+        of a residual.
+        """
+        if not self.known_noise or freedom <= 0:
+            return []
+        return size_warning(residual, freedom, self.noise_freedom)
+
+    def excess(self, result: Result, own: Array, residual: Array) -> float:  # noqa: ARG002
         """Return by how much residuals exceed noise of unit variance; at least 1."""
         return max(1.0, float(np.sqrt(np.mean(residual**2))))
 
     @abstractmethod
-    def columns(self, impact: Impact, own: Array) -> Mapping[str, Sequence[object] | Array]:
+    def columns(self, result: Result, own: Array) -> Mapping[str, Sequence[object] | Array]:
         """Return target and model side by side, SI units, dB: columns by their names."""
 
 

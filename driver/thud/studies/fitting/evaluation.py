@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -13,7 +12,7 @@ from thud.base.errors import NumericalError
 from thud.base.note import Note, of_part
 from thud.base.units import display_unit
 from thud.studies.fitting.fit_result import Fit, FittedTarget
-from thud.studies.fitting.force_target import GAIN, ForceComparison
+from thud.studies.fitting.force_target import GAIN
 from thud.studies.fitting.inference import (
     Inference,
     Posterior,
@@ -23,11 +22,11 @@ from thud.studies.fitting.inference import (
     posterior,
     worst_directions,
 )
-from thud.studies.fitting.residual_tests import UNLIKELY, size_warning
-from thud.studies.fitting.search import Objective, find_best, require_data
+from thud.studies.fitting.residual_tests import UNLIKELY
+from thud.studies.fitting.search import Objective, find_best, minimize, require_data
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Sequence
+    from collections.abc import Sequence
 
     from thud.studies.arrays import Array
     from thud.studies.fitting.ranges import Range
@@ -40,8 +39,12 @@ AT_LIMIT = 1e-4
 VISIBLE = 1e-3
 # Relative half interval above which a parameter is hardly identifiable.
 WIDE = 0.5
-# Relative errors of clock and calibration whose effect a fit states.
-CLOCK, CALIBRATION = 1e-3, 1e-2
+# Relative error of the calibration whose effect a fit states.
+CALIBRATION = 1e-2
+# Standard deviations from what is known of an own parameter above which it is unexpected, at 0.1 %.
+EXPECTED = 3.3
+# Maximum number of searches with the noise of the residuals of the one before.
+MAX_SEARCHES = 8
 
 
 class _Point(NamedTuple):
@@ -65,21 +68,35 @@ def search(
     with tqdm(unit="impact", disable=not progress, leave=False) as bar:
         objective = Objective(terms, ranges, bar)
         best = find_best(objective, options)
-        return new_fit(
-            objective, best.x, options.confidence, options.unknowns, converged=best.status > 0
-        )
+        for _ in range(MAX_SEARCHES):
+            reweighted = _reweighted(objective, best.x)
+            if all(new is old for new, old in zip(reweighted, objective.terms, strict=True)):
+                break
+            objective.terms = reweighted
+            best = minimize(objective, best.x, int(options.max_steps))
+        return new_fit(objective, best.x, options, converged=best.status > 0)
 
 
-def new_fit(
-    objective: Objective, x: Array, confidence: float, unknowns: Collection[str], *, converged: bool
-) -> Fit:
+def _reweighted(objective: Objective, x: Array) -> Sequence[Term]:
+    """Return the terms with the noise that the residuals of a point show."""
+    if not any(term.comparison.has_own_noise for term in objective.terms):
+        return objective.terms
+    jacobian, own, result = objective.jacobian(x), x * objective.scale, []
+    for term, computed in zip(objective.terms, objective.results(x), strict=True):
+        new = term.comparison.reweighted(computed, own[term.own], jacobian[term.rows])
+        result.append(term if new is term.comparison else term._replace(comparison=new))
+    return result
+
+
+def new_fit(objective: Objective, x: Array, options: SearchOptions, *, converged: bool) -> Fit:
     """Return the fit at the best point."""
     residual = objective.residual(x)
-    impacts = objective.impacts(x)
-    if not impacts:
+    results = objective.results(x)
+    if not results:
         raise NumericalError(str(objective.error))
     jacobian = objective.jacobian(x)
     finer = objective.jacobian(x, 0.5)
+    confidence = options.confidence
     terms, count, own = objective.terms, objective.count, x * objective.scale
     comparisons = [term.comparison for term in terms]
     target_size = float(np.linalg.norm(np.concatenate([c.weighted_target for c in comparisons])))
@@ -97,29 +114,29 @@ def new_fit(
     else:
         minimum = np.finfo(float).eps * target_size / np.sqrt(len(residual))
         deviation = max(float(np.sqrt(residual @ residual / freedom)), minimum)
-    effects = objective.effects(x, unknowns)
+    effects = objective.effects(x, options.unknowns)
     wrong = posterior(
         jacobian * relative / deviation,
         inferred.inverse * deviation,
         effects.columns / deviation,
         residual / deviation,
     )
-    numbered = {
-        name if len(terms) == 1 else f"{name}({number})": unit
+    own_names = (
+        name if len(terms) == 1 else f"{name}({number})"
         for number, comparison in enumerate(comparisons, start=1)
-        for name, (unit, _) in comparison.own.items()
-    }
-    names = (*(entry.name for entry in objective.ranges), *numbered)
+        for name in comparison.own
+    )
+    names = (*(entry.name for entry in objective.ranges), *own_names)
     targets = tuple(
-        FittedTarget(objective.case_at(term, x), impact, term.comparison, own[term.own])
-        for term, impact in zip(terms, impacts, strict=True)
+        FittedTarget(objective.case_at(term, x), result, term.comparison, own[term.own])
+        for term, result in zip(terms, results, strict=True)
     )
     noise = inferred.covariance * deviation**2
     point = _Point(
         names, terms, targets, residual / deviation, deviation, noise_freedom, inferred, noise
     )
     notes = [] if converged else [Note("not_converged")]
-    notes += _identifiability_notes(point, count, confidence) + _at_limits(objective, x)
+    notes += _identifiability_notes(point, count, confidence) + _at_limits(objective, x, names)
     residual_notes, ratio = _residual_warnings(point, wrong)
     notes += [*residual_notes, *effects.failures, *_effect_warning(point, effects, wrong)]
     # The second moment of the posterior about the estimate, for which the case is as assumed.
@@ -127,7 +144,7 @@ def new_fit(
     size = relative * objective.scale
     return Fit(
         names=names,
-        units=(*(entry.unit for entry in objective.ranges), *numbered.values()),
+        units=tuple(entry.unit for entry in objective.parameters),
         estimate=own,
         covariance=spread * np.outer(size, size),
         limits=np.column_stack([objective.low, objective.high]) * objective.scale[:, np.newaxis],
@@ -160,16 +177,16 @@ def _identifiability_notes(point: _Point, count: int, confidence: float) -> list
     return result
 
 
-def _at_limits(objective: Objective, x: Array) -> list[Note]:
+def _at_limits(objective: Objective, x: Array, names: Sequence[str]) -> list[Note]:
     """Return warnings of parameters at their limits."""
     result = []
-    ends = zip(objective.ranges, x, objective.low, objective.high, strict=False)
-    for entry, value, low, high in ends:
+    ends = zip(names, objective.parameters, x, objective.low, objective.high, strict=True)
+    for name, entry, value, low, high in ends:
         if min(value - low, high - value) < AT_LIMIT:
             limit = (low if value - low < high - value else high) * entry.scale
             unit, factor = display_unit(entry.unit, limit)
             shown = f"{limit / factor:g} {unit}".rstrip()
-            others = {"name": entry.name, "limit": shown}
+            others = {"name": name, "limit": shown}
             result.append(Note("at_limit", value=limit, unit=entry.unit, others=others))
     return result
 
@@ -182,18 +199,19 @@ def _residual_warnings(point: _Point, wrong: Posterior) -> tuple[list[Note], flo
     result, ratio = [], 1.0
     unexplained = point.residual + wrong.visible @ wrong.mean
     for number, (term, target) in enumerate(zip(point.terms, point.targets, strict=True), start=1):
-        comparison, impact, own = term.comparison, target.impact, target.own
+        comparison, computed, own = term.comparison, target.result, target.own
         residual, rest = point.residual[term.rows], unexplained[term.rows]
         freedom = comparison.size - comparison.absorbed - len(point.names) / len(point.targets)
-        notes = []
-        if comparison.known_noise and freedom > 0:
-            notes = size_warning(residual, freedom, comparison.noise_freedom)
-        if isinstance(comparison, ForceComparison):
-            unit = point.deviation * comparison.unit_deviation
-            notes += comparison.warnings(impact, own, residual, unit, len(point.names))
+        unit = point.deviation * comparison.unit_deviation
+        notes = comparison.warnings(computed, own, residual, freedom, unit)
         if notes:
-            excess = comparison.excess(impact, own, rest)
+            excess = comparison.excess(computed, own, rest)
             ratio = max(ratio, excess * float(np.sqrt(comparison.size / max(freedom, 1.0))))
+        for value, (name, entry) in zip(own.tolist(), comparison.own.items(), strict=True):
+            size = abs(value - entry.start) / entry.deviation
+            if size > EXPECTED:
+                ratio = max(ratio, size)
+                notes.append(Note("larger_than_expected", value=size, others={"name": name}))
         result += of_part(f"target {number}", notes) if len(point.targets) > 1 else notes
     return result, ratio
 
@@ -202,11 +220,7 @@ def _effect_warning(point: _Point, effects: Effects, wrong: Posterior) -> list[N
     """Return a warning if residuals contain the effect of an alternative to the case."""
     length = np.linalg.norm(wrong.visible, axis=0)
     seen = length > VISIBLE
-    exact = [
-        isinstance(t.comparison, ForceComparison) and t.comparison.is_exact(t.impact, t.own)
-        for t in point.targets
-    ]
-    if not seen.any() or all(exact):
+    if not seen.any() or all(t.comparison.is_exact(t.result, t.own) for t in point.targets):
         return []
     size = np.abs(point.residual @ wrong.visible[:, seen]) / length[seen]
     freedom = point.freedom
@@ -229,23 +243,15 @@ def _assumptions(point: _Point, count: int, effects: Effects) -> list[Note]:
         unknowns = ", ".join(dict.fromkeys(unknown for unknown, _ in effects.labels))
         others = {"unknowns": unknowns, "errors": listed}
         result.append(Note("unknowns_included", others=others))
-    clock, calibration = np.zeros((2, len(point.residual)))
-    shown = [False, False]
+    change = np.zeros(len(point.residual))
     for term, target in zip(point.terms, point.targets, strict=True):
-        comparison, impact, own = term.comparison, target.impact, target.own
-        if not isinstance(comparison, ForceComparison):
-            continue
-        slow = 1 + CLOCK
-        late = replace(impact, time=impact.time * slow, sample_rate=impact.sample_rate / slow)
-        here = comparison.residual(impact, own)
-        clock[term.rows], shown[0] = comparison.residual(late, own) - here, True
-        if GAIN not in comparison.own:
-            calibration[term.rows] = CALIBRATION * (here + comparison.weighted_target)
-            shown[1] = True
-    causes = f"clock {100 * CLOCK:g} % fast", f"calibration {100 * CALIBRATION:g} % high"
-    for cause, change, is_shown in zip(causes, (clock, calibration), shown, strict=True):
-        if is_shown:
-            shifts = (point.inferred.inverse @ change)[:count]
-            listed = ", ".join(f"{n} {100 * v:+.2g} %" for n, v in zip(names, shifts, strict=True))
-            result.append(Note("not_visible", others={"cause": cause, "changes": listed}))
+        comparison, rows = term.comparison, slice(term.rows.start, None)
+        if comparison.unit == "N" and GAIN not in comparison.own:
+            here = comparison.misfit(target.result, target.own) + comparison.weighted_target
+            change[rows][: len(here)] = CALIBRATION * here
+    if change.any():
+        shifts = (point.inferred.inverse @ change)[:count]
+        listed = ", ".join(f"{n} {100 * v:+.2g} %" for n, v in zip(names, shifts, strict=True))
+        others = {"cause": f"calibration {100 * CALIBRATION:g} % high", "changes": listed}
+        result.append(Note("not_visible", others=others))
     return result

@@ -14,15 +14,10 @@ from thud.case.case import case_text
 from thud.studies.fitting.force_target import ForceComparison
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from thud.studies.arrays import Array
-    from thud.studies.compression_fit import CompressionFit
-    from thud.studies.fitting.estimates import Estimates
     from thud.studies.fitting.fit_result import Fit, FittedTarget
 
 
-def parameter_rows(fit: Estimates) -> list[tuple[str, ...]]:
+def parameter_rows(fit: Fit) -> list[tuple[str, ...]]:
     """Return header and rows of text of the parameters, in the units of tables."""
     interval = f"{fit.confidence:.0%} interval"
     rows: list[tuple[str, ...]] = [("parameter", "value", "standard error", interval, "unit")]
@@ -43,20 +38,6 @@ def _digits(value: float, error: float) -> int:
     return int(np.clip(np.ceil(np.log10(abs(value) / error)) + 2, 3, 12))
 
 
-def _trust(fit: Estimates) -> list[str]:
-    """Return lines of text on what the intervals include."""
-    widened = [Note("widened", value=fit.widened)] if fit.widened != 1 else []
-    return list(map(str, (*fit.assumptions, *widened)))
-
-
-def _estimates(values: Mapping[str, tuple[float, float]], units: Mapping[str, str]) -> list[str]:
-    """Return values with their standard errors; the unit is N unless another one is stated."""
-    return [
-        f"{name} {value:.3g} ± {error:.2g} {units.get(name, 'N')}".rstrip()
-        for name, (value, error) in values.items()
-    ]
-
-
 def fit_table(fit: Fit) -> str:
     """Return parameters and quality of a fit as text."""
     freedom = fit.degrees_of_freedom
@@ -66,20 +47,11 @@ def fit_table(fit: Fit) -> str:
     # Of a single target on the line of its data.
     deviations = [_deviation(fit, target) for target in fit.targets]
     lines = [f"{data}; {deviations[0]}"] if len(deviations) == 1 else [data]
-    for number, target in enumerate(fit.targets, start=1):
-        parts = [deviations[number - 1]] if len(deviations) > 1 else []
-        parts += _estimates(target.nuisances, {})
-        label = f"target {number}: " if len(deviations) > 1 else ""
-        lines += [f"{label}{', '.join(parts)}"] if parts else []
-    lines += [*_largest_correlation(fit), *_trust(fit)]
-    lines += [f"{fit.evaluations} impacts computed{failures}"]
-    return "\n".join([format_rows(fit.rows()), "", *lines])
-
-
-def compression_table(fit: CompressionFit, units: Mapping[str, str]) -> str:
-    """Return parameters and quality of a fit to a compression as text."""
-    noise = f"{len(fit.force)} points; noise of {fit.noise:.3g} N"
-    lines = [", ".join([noise, *_estimates(fit.nuisances, units)]), *_trust(fit)]
+    if len(deviations) > 1:
+        lines += [f"target {number}: {text}" for number, text in enumerate(deviations, start=1)]
+    widened = [Note("widened", value=fit.widened)] if fit.widened != 1 else []
+    lines += [*_largest_correlation(fit), *map(str, (*fit.assumptions, *widened))]
+    lines += [f"{fit.evaluations} solutions computed{failures}"]
     return "\n".join([format_rows(fit.rows()), "", *lines])
 
 
@@ -92,11 +64,12 @@ def _deviation(fit: Fit, target: FittedTarget) -> str:
     if isinstance(comparison, ForceComparison) and comparison.noise_freedom is not None:
         in_band = f"{size * comparison.band_fraction:.3g} {unit}"
         return f"noise of {in_band} in the compared band, from the background"
-    source = "given" if fit.known_noise else "estimated from the residuals"
+    given = fit.known_noise and not comparison.has_own_noise
+    source = "given" if given else "estimated from the residuals"
     return f"standard deviation {size:.3g} {unit}, {source}"
 
 
-def _largest_correlation(fit: Estimates) -> list[str]:
+def _largest_correlation(fit: Fit) -> list[str]:
     """Return the pair of parameters that can be separated least, if there are several."""
     strong = np.triu(np.nan_to_num(np.abs(fit.correlation)), 1)
     i, j = np.unravel_index(int(np.argmax(strong)), strong.shape)
@@ -106,10 +79,13 @@ def _largest_correlation(fit: Estimates) -> list[str]:
     return [f"largest correlation: {value} of {fit.names[i]} and {fit.names[j]}"]
 
 
-def summary(fit: Estimates) -> dict[str, object]:
-    """Return the numbers of a fit for JSON; None for those that are not finite."""
+def fit_files(fit: Fit, **extra: object) -> dict[str, bytes]:
+    """Return the files of a fit by name; numbers that are not finite are null in `fit.json`.
+
+    It has further entries.
+    """
     intervals = fit.intervals()
-    return {
+    content = {
         "version": version(),
         "parameters": {
             name: {
@@ -129,52 +105,29 @@ def summary(fit: Estimates) -> dict[str, object]:
         "assumptions": list(map(str, fit.assumptions)),
         "widened": fit.widened,
         "warnings": list(map(str, fit.warnings)),
-    }
-
-
-def _pairs(values: Mapping[str, tuple[float, float]]) -> dict[str, dict[str, float]]:
-    words = ("value", "standard_error")
-    return {name: dict(zip(words, pair, strict=True)) for name, pair in values.items()}
-
-
-def fit_files(fit: Fit, **extra: object) -> dict[str, bytes]:
-    """Return the files of a fit by name; `fit.json` has further entries."""
-    content = {
-        **summary(fit),
         "model": fit.case.model.name if fit.case.model else None,
         "singular_values": fit.singular_values.tolist(),
         "reduced_chi_square": _finite(fit.reduced_chi_square),
         "noise_given": fit.known_noise,
-        "nuisances": [_pairs(target.nuisances) for target in fit.targets],
         "evaluations": fit.evaluations,
         "failures": fit.failures,
         "converged": fit.converged,
         **extra,
     }
-    files = {"fit.json": _json(content)}
+    files = {
+        "fit.json": f"{json.dumps(content, indent=2, allow_nan=False, default=str)}\n".encode()
+    }
     for target, end in zip(fit.targets, file_ends(len(fit.targets)), strict=True):
-        files[f"fit{end}.csv"] = _csv(target.columns())
+        columns = target.columns()
+        rows = zip(*columns.values(), strict=True)
+        files[f"fit{end}.csv"] = csv_text([columns, *rows]).encode()
         files[f"fitted{end}.nml"] = case_text(target.case)
     return files
-
-
-def compression_files(fit: CompressionFit) -> dict[str, bytes]:
-    """Return the files of a fit to a compression by name."""
-    content = {**summary(fit), "nuisances": _pairs(fit.nuisances)}
-    return {"fit.json": _json(content), "fit.csv": _csv(fit.columns())}
 
 
 def file_ends(count: int) -> list[str]:
     """Return the endings of the file names of targets."""
     return [""] if count == 1 else [f"_{number}" for number in range(1, count + 1)]
-
-
-def _json(content: Mapping[str, object]) -> bytes:
-    return f"{json.dumps(content, indent=2, allow_nan=False, default=str)}\n".encode()
-
-
-def _csv(columns: Mapping[str, Sequence[object] | Array]) -> bytes:
-    return csv_text([columns, *zip(*columns.values(), strict=True)]).encode()
 
 
 def _finite(value: float) -> float | None:

@@ -11,6 +11,7 @@ import numpy as np
 from thud.base._schema import SAMPLE_QUANTITIES
 from thud.base.checks import refuse, refuse_unknown, require_choice, shown
 from thud.base.immutable import Plain
+from thud.impact.compute import compute
 from thud.level.levels import BANDWIDTHS, FORCES, get_bands
 from thud.studies.fitting.comparison import STEP, Comparison, numbers, require_positive
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from thud.base._schema import BandSet, LevelsForce
+    from thud.case.case import Case
     from thud.impact.impact import Impact
     from thud.studies.arrays import Array
 
@@ -103,7 +105,7 @@ class LevelTarget(Plain):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class LevelComparison(Comparison):
+class LevelComparison(Comparison["Impact"]):
     """Levels and other quantities, prepared for a fit; see `Comparison` for the rest.
 
     Attributes
@@ -128,6 +130,10 @@ class LevelComparison(Comparison):
     target: Array
     deviation: Array
 
+    def solve(self, case: Case) -> Impact:
+        """Return the impact of a case."""
+        return compute(case)
+
     def values(self, impact: Impact) -> Array:
         """Return levels, dB, and other quantities, s and 1, of an impact, shape (size,)."""
         levels = impact.levels(self.bands, force=self.force)[list(self.indices)]
@@ -135,15 +141,15 @@ class LevelComparison(Comparison):
         extra = [impact.quantity(exact.get(name, name)) for name in self.extra]
         return np.concatenate([levels, extra])
 
-    def residual(self, impact: Impact, own: Array) -> Array:  # noqa: ARG002
-        """Return model minus target over standard deviation, shape (size,)."""
-        return (self.values(impact) - self.target) / self.deviation
+    def misfit(self, result: Impact, own: Array) -> Array:  # noqa: ARG002
+        """Return model minus target over standard deviation, shape (n,)."""
+        return (self.values(result) - self.target) / self.deviation
 
-    def columns(self, impact: Impact, own: Array) -> dict[str, list[object]]:  # noqa: ARG002
+    def columns(self, result: Impact, own: Array) -> dict[str, list[object]]:  # noqa: ARG002
         """Return target and model side by side, dB, s and 1: columns by their names."""
         nominal = get_bands(self.bands).nominal
         names = [f"{nominal[i]:g} Hz" for i in self.indices]
-        model = self.values(impact)
+        model = self.values(result)
         return {
             "quantity": [*names, *(name.replace("_", " ") for name in self.extra)],
             "target": self.target.tolist(),

@@ -11,6 +11,7 @@ from thud.base.units import power_of, scaled
 from thud.recordings.formats import FORMATS
 from thud.recordings.formats.text import read_table
 from thud.recordings.recording import read_recording
+from thud.studies.fitting.compression_target import CompressionTarget
 from thud.studies.fitting.force_record import read_record, time_and_force
 from thud.studies.fitting.force_target import ForceTarget
 from thud.studies.fitting.level_target import LevelTarget
@@ -30,7 +31,7 @@ _UNITS = {
     "noise": "N", "below": "Hz", "window": "s", "frequencies": "Hz", "gain": "",
 }  # fmt: skip
 
-Target: TypeAlias = ForceTarget | LevelTarget
+Target: TypeAlias = ForceTarget | LevelTarget | CompressionTarget
 
 
 def read_target(table: dict[str, Any], folder: Path) -> Target:

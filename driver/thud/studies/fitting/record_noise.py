@@ -1,4 +1,4 @@
-"""Noise of a record below a frequency, from its background, and the weights of residuals.
+"""Noise of a record below a frequency: that of its background, as `thud.recordings` models it.
 
 Records are compared on a grid of an odd number of points with the same Fourier coefficients up to a
 frequency. `to_grid` is orthonormal: white noise stays white and keeps its deviation.
@@ -6,13 +6,12 @@ frequency. `to_grid` is orthonormal: white noise stays white and keeps its devia
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from thud.base.immutable import freeze
+from thud.base.note import Note
 from thud.recordings.background import (
     DRIFT,
     MAINS,
@@ -33,11 +32,11 @@ if TYPE_CHECKING:
 
 # Minimum number of independent values in the band that determine the noise.
 MIN_BACKGROUND = 50
-# Minimum frequency of hum, Hz: below, it is drift within a pulse. Maximum number of its tones.
-MIN_HUM = 10.0
+# Minimum frequency of a tone, Hz: below, it is drift within a pulse. Maximum number of tones.
+MIN_TONE = 10.0
 MAX_TONES = 3
-# Harmonics of hum count up to this fraction of the highest frequency.
-HARMONIC_EDGE = 0.95
+# Tones are searched up to this fraction of the highest frequency.
+TONE_EDGE = 0.95
 # Time from the foot of a pulse to its edge, s: flanks of the models rise to it in 4 ms.
 FLANK = 2 * MARGIN * CELL
 
@@ -82,8 +81,7 @@ def find_pulse(force: Array, rate: float) -> tuple[int, int]:
     return max(int(first), 0), min(int(stop), len(force))
 
 
-@dataclass(frozen=True, eq=False)
-class Quiet:
+class Quiet(NamedTuple):
     """Background of a record, up to 0.1 s before and after its pulse.
 
     Attributes
@@ -101,8 +99,6 @@ class Quiet:
         Number of independent values in the band − 1 for the offset.
     deviation : float
         Standard deviation of the background, N.
-    below : float
-        Highest frequency that counts, Hz.
     """
 
     cells: Cells
@@ -112,48 +108,6 @@ class Quiet:
     middle: float
     freedom: int
     deviation: float
-    below: float
-
-    def background(self, tones: Sequence[float] = ()) -> Background:
-        """Return the most likely noise: white, pink, brown and hum of 50 and 60 Hz.
-
-        Tones, Hz, are removed first, by least squares.
-        """
-        waves = cell_waves(self.cells, tones)
-        residual = self.mean - waves @ np.linalg.lstsq(waves, self.mean)[0]
-        logarithms, log_covariance = fit_noise(self.cells, residual, self.peak)
-        # The waves have absorbed part of the noise.
-        n = len(self.mean)
-        scale = np.where(np.arange(5) < 3, n / (n - waves.shape[1] + 1), 1.0)  # noqa: PLR2004
-        variances = scale * np.exp(logarithms)
-        return Background(self.cells, residual, variances, self.peak, log_covariance)
-
-    def tones(self) -> tuple[float, ...]:
-        """Return the frequencies of tones, Hz, which noise and hum of 50 and 60 Hz do not explain.
-
-        A tone must raise the likelihood by more than the search over all frequencies does.
-        """
-        step = 1 / (8 * float(np.abs(self.cells).max()))
-        grid = np.arange(MIN_HUM, HARMONIC_EDGE * self.below, step)
-        # The noise includes hum of the mains.
-        grid = grid[np.abs(grid[:, np.newaxis] - MAINS).min(axis=1) > 2 * step]
-        min_gain = float(np.log(len(grid) / UNLIKELY))
-        result: tuple[float, ...] = ()
-        background = self.background()
-        best = log_likelihood(background)
-        while len(result) < MAX_TONES:
-            tried = [
-                (log_likelihood(self.background((*result, tone))), tone)
-                for whiten in (_trendless(self.cells), background.whiten)
-                for tone, gain in [strongest_tone(self.cells, background.mean, whiten, grid)]
-                if gain > min_gain
-            ]
-            likelihood, tone = max(tried, default=(best, 0.0))
-            if likelihood < best + min_gain:
-                break
-            best, result = likelihood, (*result, tone)
-            background = self.background(result)
-        return result
 
 
 def find_quiet(force: Array, rate: float, pulse: tuple[int, int], below: float) -> Quiet:
@@ -175,49 +129,51 @@ def find_quiet(force: Array, rate: float, pulse: tuple[int, int], below: float) 
         freedom=int(2 * below * seconds) - 1,
         middle=middle,
         deviation=float(np.std(np.concatenate([force[:first], force[stop:]]))) if any(sides) else 0,
-        below=below,
     )
 
 
-def wave_size(value: Array, covariance: Array) -> tuple[float, float]:
-    """Return the amplitude of a cosine and a sine, and its standard error."""
-    size = float(np.hypot(*value))
-    slope = value / size
-    return size, float(np.sqrt(slope @ covariance @ slope))
+def fit_quiet(quiet: Quiet, tones: Sequence[float] = ()) -> Background:
+    """Return the most likely noise: white, pink, brown and hum of 50 and 60 Hz.
 
-
-def cell_waves(cells: Cells, tones: Sequence[float]) -> Array:
-    """Return a constant, and means of the waves of tones, Hz, over cells: [n_cell, 1 + 2 n]."""
-    middle, width = (cells[0] + cells[1]) / 2, cells[1] - cells[0]
-    phase = 2 * np.pi * np.multiply.outer(middle, np.asarray(tones, dtype=np.float64))
-    weight = np.sinc(np.multiply.outer(width, np.asarray(tones, dtype=np.float64)))
-    constant = np.ones((len(middle), 1))
-    return np.concatenate([constant, weight * np.cos(phase), weight * np.sin(phase)], axis=1)
-
-
-def strongest_tone(cells: Cells, mean: Array, whiten: Array, grid: Array) -> tuple[float, float]:
-    """Return the frequency of the strongest tone in means of cells, Hz, and its gain.
-
-    The gain is that of the logarithm of the likelihood, the deviation of the noise estimated.
+    Tones, Hz, are removed first, by least squares.
     """
-    tone, mean = 0.0, whiten @ mean
-    for _ in range(2):
-        waves = np.moveaxis(cell_waves(cells, grid.tolist())[:, 1:].reshape(-1, 2, len(grid)), 2, 0)
-        basis, _ = np.linalg.qr(whiten @ waves)
-        power = np.sum(np.einsum("kni,n->ki", basis, mean) ** 2, axis=1)
-        index = int(np.argmax(power))
-        tone, step = float(grid[index]), float(np.diff(grid).min())
-        # Once more between the neighbors.
-        grid = np.linspace(tone - step, tone + step, 41)
-    share = min(float(power[index] / (mean @ mean)), 1 - 1e-12)
-    return tone, -0.5 * len(mean) * float(np.log1p(-share))
+    waves = np.column_stack([np.ones(len(quiet.mean)), cell_waves(quiet.cells, tones)])
+    factors = np.linalg.lstsq(waves, quiet.mean)[0]
+    residual = quiet.mean - waves @ factors
+    logarithms, log_covariance = fit_noise(quiet.cells, residual, quiet.peak)
+    # The waves have absorbed part of the noise.
+    n = len(residual)
+    scale = np.where(np.arange(5) < 3, n / (n - 2 * len(tones)), 1.0)  # noqa: PLR2004
+    sizes = np.hypot(*factors[1:].reshape(2, -1)).tolist()
+    notes = (
+        Note("tone_removed", value=size, unit="N", others={"frequency": tone})
+        for tone, size in zip(tones, sizes, strict=True)
+    )
+    variances = scale * np.exp(logarithms)
+    return Background(
+        quiet.cells, residual, variances, quiet.peak, log_covariance, tones=tuple(notes)
+    )
 
 
-def _trendless(cells: Cells) -> Array:
-    """Return the projection that removes offset and drift from cells of white noise."""
-    middle = (cells[0] + cells[1]) / 2
-    basis, _ = np.linalg.qr(np.column_stack([np.ones_like(middle), middle]))
-    return np.asarray(np.eye(len(middle)) - basis @ basis.T, dtype=np.float64)
+def find_tones(quiet: Quiet, below: float) -> tuple[float, ...]:
+    """Return the frequencies of tones, Hz, which noise and hum of 50 and 60 Hz do not explain.
+
+    A tone must raise the likelihood by more than the search over all frequencies does.
+    """
+    step = 1 / (8 * float(np.abs(quiet.cells).max()))
+    grid = np.arange(MIN_TONE, TONE_EDGE * below, step)
+    # The noise includes hum of the mains.
+    grid = grid[np.abs(grid[:, np.newaxis] - MAINS).min(axis=1) > 2 * step]
+    min_gain = float(np.log(len(grid) / UNLIKELY))
+    result: tuple[float, ...] = ()
+    best = fit_quiet(quiet)
+    while len(result) < MAX_TONES:
+        tones = (*result, strongest_tone(quiet.cells, best.mean, grid))
+        trial = fit_quiet(quiet, tones)
+        if log_likelihood(trial) < log_likelihood(best) + min_gain:
+            break
+        best, result = trial, tones
+    return result
 
 
 def log_likelihood(background: Background) -> float:
@@ -227,88 +183,96 @@ def log_likelihood(background: Background) -> float:
     return float(np.log(np.diag(whiten)).sum() - 0.5 * white @ white)
 
 
-def trimmed(force: Array, rate: float) -> slice:
-    """Return the samples of the pulse and of the background that counts."""
-    first, stop = find_pulse(force, rate)
-    room = int(MAX_BACKGROUND * rate)
-    return slice(max(first - room, 0), min(stop + room, len(force)))
+def cell_waves(cells: Cells, tones: Sequence[float] | Array) -> Array:
+    """Return means over cells of the cosines, then of the sines, of tones, Hz: [n_cell, 2 n]."""
+    middle, width = (cells[0] + cells[1]) / 2, cells[1] - cells[0]
+    frequency = np.asarray(tones, dtype=np.float64)
+    phase = 2 * np.pi * np.multiply.outer(middle, frequency)
+    weight = np.sinc(np.multiply.outer(width, frequency))
+    return np.concatenate([weight * np.cos(phase), weight * np.sin(phase)], axis=1)
 
 
-class Weights:
-    """Weights of residuals on a grid: generalized least squares, nuisance parameters projected out.
+def strongest_tone(cells: Cells, mean: Array, grid: Array) -> float:
+    """Return the frequency of the strongest tone in means of cells but their trend, Hz."""
+    middle = (cells[0] + cells[1]) / 2
+    trend, _ = np.linalg.qr(np.column_stack([np.ones_like(middle), middle]))
+    mean, tone = mean - trend @ (trend.T @ mean), 0.0
+    for _ in range(2):
+        waves = np.moveaxis(cell_waves(cells, grid).reshape(-1, 2, len(grid)), 2, 0)
+        basis, _ = np.linalg.qr(waves - trend @ (trend.T @ waves))
+        power = np.sum(np.einsum("kni,n->ki", basis, mean) ** 2, axis=1)
+        tone, step = float(grid[np.argmax(power)]), float(np.diff(grid).min())
+        # Once more between the neighbors.
+        grid = np.linspace(tone - step, tone + step, 41)
+    return tone
+
+
+class Noise(NamedTuple):
+    """Noise on a grid of n points.
 
     Attributes
     ----------
-    covariance : ndarray, shape (n, n)
-        Covariance of the noise, N2.
-    nuisance : ndarray, shape (n, n_nuisance)
-        What each nuisance parameter adds to the record, for 1 N.
+    whiten : ndarray, shape (n, n)
+        Makes it independent and of unit variance: of each point in time it leaves what the points
+        before it do not predict, 1/N.
     predicted : ndarray, shape (n, n)
-        The component of the covariance that is predicted from the residual: drift and hum, N2.
+        The component of the covariance that is predicted from the residual: offset, drift, hum and
+        tones, N2.
+    deviation : float
+        Standard deviation of the rest about its mean, N.
     """
 
-    def __init__(self, covariance: Array, nuisance: Array, predicted: Array) -> None:
-        self.covariance, self.nuisance = freeze(covariance), freeze(nuisance)
-        self.predicted = freeze(predicted)
-        # Whitening leaves of each point in time what the points before it do not predict.
-        factor = np.linalg.cholesky(covariance)
-        self._whiten = solve_triangular(factor, np.eye(len(factor)), lower=True, check_finite=False)
-        self._basis, self._triangle = np.linalg.qr(self._whiten @ nuisance)
-        self.matrix = freeze(self._whiten - self._basis @ (self._basis.T @ self._whiten))
-
-    def deviation(self) -> float:
-        """Return the standard deviation of the noise about its mean over the grid, N."""
-        count = len(self.covariance)
-        noise = self.covariance - self.predicted
-        spread = np.trace(noise) - noise.sum() / count
-        return float(np.sqrt(spread / (count - 1)))
-
-    def estimates(self, difference: Array) -> tuple[Array, Array]:
-        """Return the nuisance parameters of record − model, N, and their covariance, N2."""
-        inverse = np.linalg.inv(self._triangle)
-        return inverse @ (self._basis.T @ (self._whiten @ difference)), inverse @ inverse.T
+    whiten: Array
+    predicted: Array
+    deviation: float
 
     def background(self, difference: Array) -> Array:
-        """Return what offset, drift and hum add to the record, N: [n], from record − model."""
-        value, _ = self.estimates(difference)
-        weighted = self._whiten.T @ (self.matrix @ difference)
-        result: Array = self.nuisance @ value + self.predicted @ weighted
+        """Return what offset, drift, hum and tones add to the record, N: [n]; of its difference."""
+        result: Array = self.predicted @ (self.whiten.T @ (self.whiten @ difference))
         return result
 
 
-def new_weights(  # noqa: PLR0913 - components of the noise
+def new_noise(other: Array, predicted: Array) -> Noise:
+    """Return noise that is the sum of two components, of which one is predicted."""
+    count = len(other)
+    deviation = np.sqrt((np.trace(other) - other.sum() / count) / (count - 1))
+    factor = np.linalg.cholesky(other + predicted)
+    whiten = solve_triangular(factor, np.eye(count), lower=True, check_finite=False)
+    return Noise(whiten, predicted, float(deviation))
+
+
+def record_noise(  # noqa: PLR0913 - components of the noise
     time: Array,
     rate: float,
     count: int,
     *,
     background: Background | None,
-    noise: float | None,
-    offset: bool,
-    tones: Sequence[float],
-) -> Weights:
-    """Return the weights of a record at times, s from the middle of the pulse, on a grid.
+    white: float | None,
+    offset: float,
+) -> Noise:
+    """Return the noise of a record at times, s from the middle of the pulse, on a grid.
 
-    The grid has `count` points. `noise` is the standard deviation of white noise, N, instead of the
-    noise of the background; if neither is known, it is 1 N. Waves of the `tones`, Hz, and an
-    `offset` are nuisance parameters; hum of 50 and 60 Hz is that of the background.
+    The grid has `count` points. `white` is the standard deviation of white noise, N, instead of the
+    noise of the background; if neither is known, it is 1 N. Hum of 50 and 60 Hz is that of the
+    background. `offset` is the prior standard deviation of an offset and of the amplitudes of the
+    tones of the background, N.
     """
     n = len(time)
-    white, colored, humming = (noise or 1.0) ** 2, np.zeros(n), np.zeros(n)
-    drift = 0.0
+    variance, colored, humming = (white or 1.0) ** 2, np.zeros(n), np.zeros(n)
+    columns = [np.full(n, offset)]
     if background is not None:
         samples = time, time + 1 / rate
         rows = unit_covariances((time[:1], time[:1] + 1 / rate), samples)[:, 0]
         variances = background.variances
-        if noise is None:
-            white = variances[0] * rate / 2
+        if white is None:
+            variance = variances[0] * rate / 2
             colored = variances[1:3] @ rows[:2]
         humming = variances[3:] @ rows[2:4]
-        drift = DRIFT * background.peak if offset else 0.0
-    slope = to_grid(drift * time[:, np.newaxis], count)
-    predicted = grid_covariance(humming, count) + slope @ slope.T
-    covariance = white * np.eye(count) + grid_covariance(colored, count) + predicted
+        tones = [float(note.others["frequency"]) for note in background.tones]
+        columns += [DRIFT * background.peak * time, *(offset * cell_waves(samples, tones).T)]
+    trends = to_grid(np.column_stack(columns), count)
     # Covariances of pink and brown noise hold up to a constant, that of an unknown offset; one of
     # the samples is root(n/count) times as large on the grid.
-    covariance += 10 * np.abs(colored).max() * n / count
-    columns = cell_waves((time, time + 1 / rate), tones)[:, 0 if offset else 1 :]
-    return Weights(covariance, to_grid(columns, count), predicted)
+    other = variance * np.eye(count) + grid_covariance(colored, count)
+    other += 10 * np.abs(colored).max() * n / count
+    return new_noise(other, grid_covariance(humming, count) + trends @ trends.T)

@@ -84,15 +84,3 @@ def contact_warning(
         return []
     value, high = (unit * math.sqrt(part) for part in (square, outside))
     return [Note("residuals_in_contact", value=value, high=high, unit="N")]
-
-
-def change_warning(
-    residual: Array, before: NDArray[np.bool_], after: NDArray[np.bool_]
-) -> list[Note]:
-    """Return a warning if residuals before contact differ from those after it (F)."""
-    counts = int(before.sum()), int(after.sum())
-    if min(counts) < MIN_FREEDOM:
-        return []
-    ratio = float(np.mean(residual[after] ** 2) / np.mean(residual[before] ** 2))
-    tail = min(stats.f.sf(ratio, *counts[::-1]), stats.f.cdf(ratio, *counts[::-1]))
-    return [] if 2 * tail > UNLIKELY else [Note("residuals_change", value=math.sqrt(ratio))]

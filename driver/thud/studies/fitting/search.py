@@ -12,9 +12,7 @@ from thud.base.checks import MAX_SEED, refuse, require_whole
 from thud.base.errors import NumericalError, ThudError
 from thud.base.note import Note
 from thud.case.keys import with_values
-from thud.impact.compute import compute
 from thud.studies.fitting.alternatives import UNKNOWNS, alternatives, require_unknowns
-from thud.studies.fitting.force_target import ForceComparison
 from thud.studies.fitting.inference import require_confidence
 from thud.studies.sampling import unit_samples
 
@@ -24,9 +22,8 @@ if TYPE_CHECKING:
     from tqdm import tqdm
 
     from thud.case.case import Case
-    from thud.impact.impact import Impact
     from thud.studies.arrays import Array
-    from thud.studies.fitting.comparison import Comparison
+    from thud.studies.fitting.comparison import Comparison, Own
     from thud.studies.fitting.ranges import Range
 
 
@@ -72,7 +69,7 @@ class Term(NamedTuple):
     """
 
     case: Case
-    comparison: Comparison
+    comparison: Comparison[Any]
     own: slice
     rows: slice
 
@@ -102,14 +99,14 @@ class Objective:
     def __init__(self, terms: Sequence[Term], ranges: Sequence[Range], bar: tqdm[Any]) -> None:
         self.terms, self.ranges, self.bar = terms, ranges, bar
         self.count, self.size = len(ranges), terms[-1].rows.stop
-        own = [scale for term in terms for _, scale in term.comparison.own.values()]
-        unlimited = np.full(len(own), np.inf)
-        self.scale = np.array([entry.scale for entry in ranges] + own)
-        self.low = np.append([entry.low for entry in ranges], -unlimited) / self.scale
-        self.high = np.append([entry.high for entry in ranges], unlimited) / self.scale
+        own = (entry for term in terms for entry in term.comparison.own.values())
+        self.parameters: list[Range | Own] = [*ranges, *own]
+        self.scale = np.array([entry.scale for entry in self.parameters])
+        self.low = np.array([entry.low for entry in self.parameters]) / self.scale
+        self.high = np.array([entry.high for entry in self.parameters]) / self.scale
         self.evaluations = self.failures = 0
         self.error: ThudError | None = None
-        self._last: tuple[bytes, list[Impact]] | None = None
+        self._results: dict[bytes, list[Any]] = {}
 
     def case_at(self, term: Term, x: Array) -> Case:
         """Return the case of a term at a point x."""
@@ -117,46 +114,45 @@ class Objective:
         names = (entry.name for entry in self.ranges)
         return with_values(term.case, dict(zip(names, values, strict=True)))
 
-    def _impact(self, case: Case) -> Impact:
-        """Return the impact of a case, and count it."""
+    def _solve(self, term: Term, case: Case) -> Any:  # noqa: ANN401 - what the target compares
+        """Return what the model of a case computes, and count it."""
         self.evaluations += 1
         self.bar.update()
-        return compute(case)
+        return term.comparison.solve(case)
 
-    def impacts(self, x: Array) -> list[Impact]:
-        """Return the impacts of a point, one for each term; an empty list if one fails."""
+    def results(self, x: Array) -> list[Any]:
+        """Return what the model computes at a point for each term; an empty list if one fails."""
         key = x[: self.count].tobytes()
-        if self._last and self._last[0] == key:
-            return self._last[1]
+        if key in self._results:
+            return self._results[key]
         try:
-            impacts = [self._impact(self.case_at(term, x)) for term in self.terms]
+            results = [self._solve(term, self.case_at(term, x)) for term in self.terms]
         except ThudError as error:
             self.failures += 1
             self.error = error
             return []
-        self._last = key, impacts
-        return impacts
+        # The point, those beside it, and the next one.
+        if len(self._results) > 2 * self.count + 1:
+            del self._results[next(iter(self._results))]
+        self._results[key] = results
+        return results
 
     def residual(self, x: Array) -> Array:
-        """Return the residuals of a point; infinite if an impact fails."""
-        impacts = self.impacts(x)
-        if not impacts:
+        """Return the residuals of a point; infinite if a model fails."""
+        results = self.results(x)
+        if not results:
             return np.full(self.size, np.inf)
         own = x * self.scale
-        pairs = zip(self.terms, impacts, strict=True)
+        pairs = zip(self.terms, results, strict=True)
         return np.concatenate([p.comparison.residual(i, own[p.own]) for p, i in pairs])
 
     def jacobian(self, x: Array, fraction: float = 1.0) -> Array:
         """Return the derivatives of the residuals with a fraction of the step, (n_residual, n)."""
         step = fraction * max(term.comparison.step for term in self.terms)
-        here, own = self.residual(x), x * self.scale
+        here = self.residual(x)
         jacobian = np.zeros((self.size, len(x)))
-        # First these, because the other columns compute other impacts.
-        for term, impact in zip(self.terms, self.impacts(x), strict=False):
-            if isinstance(term.comparison, ForceComparison):
-                slopes = term.comparison.own_derivatives(impact, own[term.own])
-                jacobian[term.rows, term.own] = slopes * self.scale[term.own]
-        for i in range(self.count):
+        # Own parameters first: they need no other results.
+        for i in reversed(range(len(x))):
             jacobian[:, i] = self._column(x, i, step, here)
         return jacobian
 
@@ -184,15 +180,15 @@ class Objective:
         fitted = [entry.name for entry in self.ranges]
         columns: dict[tuple[str, str], Array] = {}
         failures: list[Note] = []
-        for term, impact in zip(self.terms, self.impacts(x), strict=True):
+        for term, result in zip(self.terms, self.results(x), strict=True):
             comparison, own = term.comparison, (x * self.scale)[term.own]
-            if not isinstance(comparison, ForceComparison):
+            if not comparison.has_alternatives:
                 continue
-            here = comparison.residual(impact, own)
+            here = comparison.residual(result, own)
             for unknown, label, case in alternatives(self.case_at(term, x), unknowns, fitted):
                 column = columns.setdefault((unknown, label), np.zeros(self.size))
                 try:
-                    other = self._impact(case)
+                    other = self._solve(term, case)
                 except ThudError as error:
                     others = {"alternative": label, "unknown": unknown, "reason": str(error)}
                     failures.append(Note("alternative_failed", others=others))
@@ -211,8 +207,8 @@ def require_data(terms: Sequence[Term], count: int) -> None:
     known = all(comparison.known_noise for comparison in comparisons)
     if len(terms) > 1 and not known:
         number = [comparison.known_noise for comparison in comparisons].index(False)
-        is_force = isinstance(comparisons[number], ForceComparison)
-        source = "noise, or 50 independent values of background," if is_force else "uncertainty"
+        is_level = comparisons[number].unit == "dB"
+        source = "uncertainty" if is_level else "noise, or 50 independent values of background,"
         refuse(
             f"target {number + 1}: the weight of its residuals is not known",
             f"{source} where there are several targets",
@@ -236,7 +232,7 @@ def find_best(objective: Objective, options: SearchOptions) -> OptimizeResult:
     failures: list[ThudError] = []
     for start in starts_of(objective.ranges, int(options.starts), int(options.seed)):
         try:
-            result = _minimize(objective, start, int(options.max_steps))
+            result = minimize(objective, _with_own(objective, start), int(options.max_steps))
         except ThudError as error:
             failures.append(error)
             continue
@@ -258,17 +254,21 @@ def starts_of(ranges: Sequence[Range], count: int, seed: int) -> Iterator[Array]
         yield low + x * (high - low)
 
 
-def _minimize(objective: Objective, start: Array, max_steps: int) -> OptimizeResult:
-    first = objective.impacts(start)
+def _with_own(objective: Objective, start: Array) -> Array:
+    """Return a start with the own parameters of the targets."""
+    first = objective.results(start)
     if not first:
         message = f"the start cannot be computed: {objective.error}"
         raise type(objective.error or NumericalError())(message)
     own = [
-        term.comparison.own_start(impact) / objective.scale[term.own]
-        for term, impact in zip(objective.terms, first, strict=True)
-        if isinstance(term.comparison, ForceComparison)
+        term.comparison.start(result) / objective.scale[term.own]
+        for term, result in zip(objective.terms, first, strict=True)
     ]
-    start = np.concatenate([start, *own])
+    return np.concatenate([start, *own])
+
+
+def minimize(objective: Objective, start: Array, max_steps: int) -> OptimizeResult:
+    """Return the least-squares solution from a start."""
     return least_squares(
         objective.residual,
         start,
