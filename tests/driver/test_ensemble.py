@@ -410,7 +410,7 @@ def test_samples_state_what_studies_state() -> None:
     first, second, last = found.notes
     assert (first.code, first.value, first.high) == ("samples_failed", 1, 3)
     assert first.others["reason"] == found.reason[2]
-    assert str(first).startswith("1 of 3 samples have no results; most frequent reason: ")
+    assert str(first).startswith("1 of 3 samples failed; most frequent reason: ")
     assert (second.code, second.value, second.high) == ("samples_not_standard", 2, 3)
     assert last.code == "no_numerical_errors"
     # Nothing is said of a source without levels, or of a room that is not there.

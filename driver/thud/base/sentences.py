@@ -18,8 +18,7 @@ PROCESSING = {
     "sign_stated": "the sign was changed: polarity = '{polarity}'",
     "sign_changed": "the sign was changed: the largest peak, {value:.4g} {unit}, is negative",
     "cells_added": "the forces of {value:g} load cells were added",
-    "rate_replaced": "the rate of the file, {of_file:.7g} {unit}, was replaced by {value:.7g} "
-    "{unit} as stated",
+    "rate_replaced": "the rate, {of_file:.7g} {unit}, was replaced by {value:.7g} {unit} as stated",
     "unit_replaced": "the unit of the file, {of_file}, was replaced by {unit} as stated",
     "unit_assumed": "the file states no unit; the values are assumed to be in {unit}",
     "unit_of_calibration": "the file states no unit; by the calibration the values are in {unit}",
@@ -59,10 +58,8 @@ PROCESSING = {
 # What may be wrong.
 WARNINGS = {
     # Signals of files.
-    "peak_unusual": "the peak is {value:.4g} {unit}; heavy/soft sources have {low:g} to {high:g} "
-    "{unit}",
-    "polarity_doubtful": "the peaks are {opposite:.4g} {unit} and {value:.4g} {unit}; the polarity "
-    "may be wrong",
+    "peak_unusual": "the peak is {value:.4g} {unit}; usual are {low:g} to {high:g} {unit}",
+    "polarity_doubtful": "peaks of {opposite:.4g} and {value:.4g} {unit}: check the polarity",
     "forces_left_out": "further channels with forces are not included: {channels}",
     "cell_sign": "the peak of this load cell is {value:.4g} {unit}, that of the sum {total:.4g} "
     "{unit}; its sign may be wrong",
@@ -114,8 +111,7 @@ WARNINGS = {
     "quarter of the sample rate or above (up to {value:.2g} {unit} at {band:g} Hz)",
     "noise_ends": "the noise of the background ends near {value:.2g} {unit}: the samples were "
     "smoothed or interpolated, which changes levels and contact time; state [filter]",
-    "plate_not_flat": "the force plate is flat up to {value:g} {unit}; the standard requires "
-    "{low:g} {unit}",
+    "plate_not_flat": "plate flat up to {value:g} {unit}; the standard requires {low:g} {unit}",
     "plate_low": "at {frequency:g} Hz the plate reads {value:.2g} {unit} too little (time constant "
     "{time_constant:g} s; 2 % need {needed:.1f} s)",
     "plate_high": "up to {frequency:g} Hz the plate with its resonance of {f0:.5g} Hz is up to "
@@ -136,15 +132,13 @@ WARNINGS = {
     # Level in a room.
     "level_below_paths": "the rating is below {high:g} {unit}: flanking paths, gaps and bridges, "
     "which are not predicted, are expected to be louder",
-    "blocked_force": "the force on a rigid floor is used: the motion of this floor would change "
-    "its peak by about {value:.1f} {unit}",
+    "blocked_force": "the force is that on a rigid floor, whose peak differs by {value:.1f} {unit}",
     "blocked_model": "the model {model} has the force on a rigid floor only: this floor would "
     "change its peak by at most {high:g} {unit}",
     "source_not_conforming": "the source does not conform ({octaves} from the nominal levels): the "
     "level in the room is not that of a standard source",
     # Measured levels in rooms.
-    "few_positions": "levels of {value:g} of the {low:g} positions of the source that ISO 16283-2 "
-    "requires",
+    "few_positions": "{value:g} positions of the source; ISO 16283-2 requires {low:g}",
     "positions_differ": "the levels of two positions differ by {value:.0f} {unit} on average (up "
     "to {high:g} {unit} is plausible)",
     "background_unknown": "the background is not known: levels are not corrected for it",
@@ -181,26 +175,22 @@ WARNINGS = {
     "±{value:.0f} {unit} of its value",
     "hardly_identifiable": "{names} are hardly identifiable: along {changes} the {confidence:.0%} "
     "interval is ±{value:.0f} {unit}{product}",
-    "at_limit": "{name} ended at its limit, {limit}, where its interval is cut; all intervals hold "
-    "inside the limits only",
+    "at_limit": "{name} ended at its limit, {limit}: all intervals hold inside the limits only",
     "alternative_seen": "the residuals contain the effect of {alternative} ({value:.3g} standard "
     "errors): the {unknown} is not as assumed, and the intervals include the difference",
     "alternative_failed": "{alternative} failed: the {unknown} counts as known ({reason})",
-    "unexplained": "the residuals are {value:.3g} times as large as the uncertainty of the target: "
-    "the model does not explain the data",
+    "unexplained": "the residuals are {value:.3g} times the uncertainty: the model does not fit",
     "residuals_colored": "half of the power of the residuals lies in the {side}est {value:.0%} of "
     "the compared frequencies: the noise is not as assumed or the model is wrong",
     "residuals_in_contact": "the residual is {value:.3g} {unit} during the contact and {high:.3g} "
     "{unit} otherwise: the model differs from the force by more than the noise",
-    "residuals_change": "the residuals are {value:.3g} times as large after the contact as before "
-    "it: the noise changes",
+    "residuals_change": "the residuals are {value:.3g} times as large after the contact as before",
     "background_too_short": "the background lasts {value:.3g} {unit}: offset, hum and color of the "
     "noise are not known, and the intervals hold for white noise alone",
     "touch_at_limit": "the first touch is at the limit of the search; begin the data with it",
     "larger_than_expected": "the {name} is {value:.2g} times as large as expected",
     # Samples.
-    "samples_failed": "{value:.0f} of {high:.0f} samples have no results; most frequent reason: "
-    "{reason}",
+    "samples_failed": "{value:.0f} of {high:.0f} samples failed; most frequent reason: {reason}",
     "samples_not_standard": "the sources of {value:.0f} of {high:.0f} samples do not conform: "
     "their levels in the room are not those of a standard source",
 }
