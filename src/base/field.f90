@@ -1,6 +1,5 @@
 !> One key of the input: its name, unit, allowed range and meaning, and the variable that it sets. The input is read,
-!> checked, written and documented by this description. `in_group` sets the group and the owner of keys, `only_with` the
-!> key that switches them on.
+!> checked, written and documented by this description. `in_group` sets group and owner, `only_with` a switch of keys.
 module thud_field
    use thud_error, only: error_type, input_error
    use thud_interval, only: get_range_text, interval_type, key_length, new_interval
@@ -64,8 +63,8 @@ module thud_field
       !> `derived` (at the value 0 it follows from other keys), or `calibrated` (on the standard ball: where the key is not
       !> stated, it has the value of the standard ball by the model).
       character(len=10) :: trait = ''
-      !> What the key needs for an effect: another one that is neither 0 nor empty, or a choice and its values, the
-      !> calibrated one first; blank: nothing: [max_choices].
+      !> Key without which this one has no effect, and, if that is a choice, the values with which it has one, the
+      !> calibrated one first; blank: none: [max_choices].
       character(len=key_length) :: needs(max_choices) = ''
       !> Number of allowed texts; 0 for free text.
       integer :: n_choice = 0
@@ -139,7 +138,7 @@ contains
       if (present(owner)) placed%owner = owner
    end function in_group
 
-   !> Keys that have an effect only with another one, except keys that need one already.
+   !> Keys that have an effect only with another one.
    function only_with(switch, fields, values) result(needing)
       !> The other key.
       character(len=*), intent(in) :: switch
@@ -152,7 +151,6 @@ contains
 
       needing = fields
       do i = 1, size(fields)
-         if (needing(i)%needs(1) /= '') cycle
          needing(i)%needs(1) = switch
          if (present(values)) needing(i)%needs(2:size(values) + 1) = values
       end do
@@ -168,10 +166,8 @@ contains
 
       i = findloc(fields%owner == field%owner .and. fields%key == field%needs(1), .true., dim=1)
       yes = field%needs(1) == ''
-      if (i == 0) return
-      yes = any(abs(fields(i)%get_entries()) > 0.0_wp)
-      if (field%needs(2) /= '') yes = any(field%needs(2:) == fields(i)%choices(nint(fields(i)%get_number())))
-      yes = yes .and. fields(i)%has_effect(fields)
+      if (i > 0) yes = fields(i)%has_effect(fields) .and. any(abs(fields(i)%get_entries()) > 0.0_wp)
+      if (yes .and. field%needs(2) /= '') yes = any(field%needs(2:) == fields(i)%choices(nint(fields(i)%get_number())))
    end function has_effect
 
    !> Returns an error for the first value outside its range, NaN included.

@@ -16,7 +16,7 @@ import thud
 from thud.base._schema import LIMITS
 from thud.level.assessment import Criterion, Verdict, octave_limits
 from thud.level.estimate import Estimate
-from thud.level.levels import BANDWIDTHS, RECORDED_BAND, SOURCES, low_pass, peak_count
+from thud.level.levels import RECORDED_BAND, SOURCES, low_pass, peak_count
 
 if TYPE_CHECKING:
     from thud.base._schema import LimitsSource
@@ -33,17 +33,6 @@ def test_bands_are_complete_and_adjacent() -> None:
     # They are those of all callers.
     with pytest.raises(ValueError, match="read-only"):
         octaves.lower[0] = 0.0
-
-
-def test_samples_and_sources_are_those_of_the_library() -> None:
-    assert BANDWIDTHS == ("octave", "third")
-    assert SOURCES == ("rubber_ball", "tyre")
-    for bands in BANDWIDTHS:
-        count = len(thud.get_bands(bands).nominal)
-        assert thud.force_exposure_levels(PULSE, 44100, bands).shape == (count,)
-    for source in SOURCES:
-        lower, upper = octave_limits(source)
-        assert (lower < upper).all()
 
 
 def test_threads_share_plans() -> None:

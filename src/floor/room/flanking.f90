@@ -61,10 +61,10 @@ contains
          new_field('wall_loss_factor', walls%loss_factor, '', &
          'internal loss factor of the walls: one, or one for each', '[0, 1]'), &
          new_field('wall_junction', walls%junction, '', &
-         'junction of floor and walls: rigid cross or T, or described by junction_index', choices=junctions), &
+         'junction of floor and walls: rigid cross or T, or described by junction_index', choices=junctions)]), &
          only_with('wall_junction', [new_field('junction_index', walls%index, 'dB', &
          'vibration reduction index from floor to wall, for wall_junction index: one, or one for each wall', &
-         '[-10, 80]')], junctions(3:))])]
+         '[-10, 80]')], junctions(3:))]
    end function get_wall_fields
 
    !> Checks the numbers of values of the walls.
