@@ -40,10 +40,9 @@ def run_study(options: argparse.Namespace) -> int:
     if not options.quiet:
         print_status(describe(study))
     folder = Path(options.output or Path("outputs", study.name))
-    figures = () if options.no_figures else (f"{study.name}.svg",)
     try:
         computed = compute(
-            result, study, folder, figures, workers=options.workers, replace=options.replace,
+            result, study, folder, workers=options.workers, replace=options.replace,
             progress=shows_progress(quiet=options.quiet),
         )  # fmt: skip
     except ThudError as error:

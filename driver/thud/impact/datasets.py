@@ -6,6 +6,7 @@ import math
 import platform
 from collections import Counter
 from datetime import UTC, datetime
+from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -201,9 +202,6 @@ def _frequencies(used: Iterable[str]) -> dict[str, Any]:
 
 def case_attributes(case: Case) -> dict[str, str]:
     """Return the case and the software of results as attributes of a dataset."""
-    with require_extra("studies"):
-        import xarray as xr
-
     return {
         "model": case.model.name if case.model else "",
         "assessed_force": case.levels.force,
@@ -214,7 +212,7 @@ def case_attributes(case: Case) -> dict[str, str]:
         "compiler": compiler(),
         "python_version": platform.python_version(),
         "numpy_version": np.__version__,
-        "xarray_version": xr.__version__,
+        "xarray_version": metadata.version("xarray"),
         "machine": platform.machine(),
         "date_created": datetime.now(UTC).isoformat(timespec="seconds"),
     }

@@ -12,10 +12,13 @@ if TYPE_CHECKING:
 
 
 class Kind(NamedTuple):
-    """Help of the command of a kind of study, and its sampling designs, the default first."""
+    """A kind of study: help of its command, sampling designs, and end of the name of its table."""
 
     help: str
+    # The default first.
     designs: tuple[str, ...]
+    # Empty: only the samples are written.
+    table: str = ""
 
 
 # A key names the command, the function, and the module with the class of the result, such as
@@ -26,7 +29,9 @@ KINDS = {
         ("grid", "list", "random", "latin_hypercube", "sobol"),
     ),
     "sensitivity": Kind(
-        "Sobol indices: how much each parameter affects each result", ("saltelli",)
+        "Sobol indices: how much each parameter affects each result",
+        ("saltelli",),
+        "_indices.csv",
     ),
     "design": Kind("which geometries and materials conform to the standards", ("grid",)),
     "uncertainty": Kind("effect of tolerances on levels and conformity", ("random",)),

@@ -161,8 +161,8 @@ def read_varied(name: str, table: object, case: Case, default_mean: Value | None
         allowed = ", ".join(map(repr, key.choices)) or "true, false"
         refuse(f"{label}: its values are not numbers", f"values = [...] of {allowed}")
     values = entries.get("values", ())
-    if form == "values" and not (isinstance(values, list | tuple) and values):
-        refuse_value(f"{label}: values", values, "a list of at least one value")
+    if form == "values" and values in ([], ()):
+        refuse_value(f"{label}: values", values, "at least one value")
     numbers: dict[str, Any] = {
         word: float(read_value(f"{label}: {word}", key, entries[word], power))
         for word in ("low", "high", "mean", "std")
@@ -171,7 +171,8 @@ def read_varied(name: str, table: object, case: Case, default_mean: Value | None
     result = {word: value for word, value in entries.items() if word not in numbers}
     result |= numbers
     if form == "values":
-        result["values"] = tuple(read_value(f"{label}: values", key, v, power) for v in values)
+        listed = values if isinstance(values, list | tuple) else [values]
+        result["values"] = tuple(read_value(f"{label}: values", key, v, power) for v in listed)
     elif form == "low":
         _check_range(label, key, result, entries)
     else:

@@ -19,11 +19,13 @@ from thud.impact.ensemble import MAX_THREADS, solve_many
 from thud.studies.dataset import (
     join_blocks,
     new_dataset,
+    open_directory,
     provenance_of,
     read_dataset,
+    remove,
     write_dataset,
 )
-from thud.studies.directory import open_directory, remove
+from thud.studies.kinds import KINDS
 from thud.studies.study import read_study, with_surrogate
 
 if TYPE_CHECKING:
@@ -75,7 +77,6 @@ def compute(
     result: type[R],
     source: Source,
     output: str | os.PathLike[str] | None = None,
-    others: Iterable[str] = (),
     **options: Unpack[RunOptions],
 ) -> R:
     """Return the result of a study, also written to a directory; see `thud.sweep` and `run`.
@@ -87,9 +88,8 @@ def compute(
     if (surrogate := options.get("surrogate")) is not None:
         study = with_surrogate(study, surrogate)
     result.check(study)
-    tables = [f"{study.name}{result.table_ending}"] if result.table_ending else []
     try:
-        dataset = run(study, output, (*others, *tables), **options)
+        dataset = run(study, output, **options)
         if dataset["status"].all():
             reason = dataset["reason"].to_numpy().flat[0]
             message = f"none of {study.count} samples has a result: {reason}"
@@ -97,18 +97,16 @@ def compute(
         computed = result(dataset)
     except MemoryError as error:
         refuse(f"{study.count} samples do not fit in memory", "fewer samples", error)
-    if output is not None:
-        for name in tables:
-            table = computed.to_dataframe()
-            text = table.to_csv(float_format="%.6g", na_rep="nan", lineterminator="\n")
-            replace_file(Path(output, name), text.encode())
+    if output is not None and (end := KINDS[study.kind].table):
+        table = computed.to_dataframe()
+        text = table.to_csv(float_format="%.6g", na_rep="nan", lineterminator="\n")
+        replace_file(Path(output, f"{study.name}{end}"), text.encode())
     return computed
 
 
 def run(
     study: Study,
     path: str | os.PathLike[str] | None = None,
-    others: Iterable[str] = (),
     **options: Unpack[RunOptions],
 ) -> xr.Dataset:
     """Return the results of all samples of a study; a sample that fails has a status and a reason.
@@ -122,8 +120,6 @@ def run(
         The study.
     path
         Directory of the results.
-    others
-        Names of files that the caller writes beside them.
     **options
         See `RunOptions`.
 
@@ -140,8 +136,7 @@ def run(
     study.parameter_columns(0, 1)
     file = partial = None
     if path is not None:
-        replace = options.get("replace", False)
-        file, partial = open_directory(path, study, others, replace=replace)
+        file, partial = open_directory(path, study, replace=options.get("replace", False))
         if file.exists():
             remove(partial)
             return read_dataset(file)
@@ -167,14 +162,8 @@ def run(
         return join_blocks(study, [finished[start] for start in starts])
     blocks = [read_dataset(_block(partial, start)) for start in starts]
     # A run of another version that replaces the results at the same time writes there as well.
-    foreign = [
-        start
-        for start, block in zip(starts, blocks, strict=True)
-        if block.attrs["identity"] != provenance["identity"]
-    ]
-    for start in foreign:
-        remove(_block(partial, start))
-    if foreign:
+    if any(block.attrs["identity"] != provenance["identity"] for block in blocks):
+        remove(partial)
         refuse(f"{partial} has got blocks of another version of this study", "run it again")
     write_dataset(join_blocks(study, blocks), file)
     remove(partial)

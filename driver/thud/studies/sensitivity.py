@@ -55,7 +55,6 @@ class Sensitivity(SampleResult):
     drawn_by: ClassVar[str] = "study_figures.draw_sensitivity"
 
     kind: ClassVar[str] = "sensitivity"
-    table_ending: ClassVar[str] = "_indices.csv"
 
     dataset: xr.Dataset
     indices: xr.Dataset = field(init=False)

@@ -31,8 +31,6 @@ class SampleResult(Displayed):
 
     # Kind of study, see `thud.studies.kinds.KINDS`.
     kind: ClassVar[str]
-    # End of the name of a file with `to_dataframe`; empty: only the samples are written.
-    table_ending: ClassVar[str] = ""
 
     dataset: xr.Dataset
 
