@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-import scipy
 import xarray as xr
 from conftest import REPOSITORY, names_in, naming, python
 from hypothesis import HealthCheck, given, settings, strategies as st
@@ -70,19 +69,22 @@ def test_dataset_tells_units_and_where_it_comes_from(tmp_path: Path) -> None:
         assert "youngs_modulus = 1560000.0" in found.attrs["resolved_case"]
 
 
-def test_other_makers_of_points_are_another_study(monkeypatch: pytest.MonkeyPatch) -> None:
-    drawn = thud.read_study(
-        {"design": {"kind": "sobol", "size": 2}, "parameters": {"height": {"low": 1, "high": 2}}}
-    )
-    grid = thud.read_study(HEIGHTS)
-    before = drawn.identity, grid.identity
-    found = thud.sweep(drawn).dataset
-    assert found.attrs["scipy_version"] == scipy.__version__
-    assert "salib_version" not in found.attrs
-    assert "salib_version" in sampling.sampler_versions("saltelli")
-    monkeypatch.setattr(sampling, "version", lambda _: "0.0.1")
-    assert drawn.identity != before[0]
-    assert grid.identity == before[1]
+@pytest.mark.parametrize(
+    ("kind", "design", "makers"),
+    [("sweep", "grid", set()), ("sweep", "sobol", {"scipy"}),
+     ("sensitivity", "saltelli", {"scipy", "salib"})],
+)  # fmt: skip
+def test_other_makers_of_points_are_another_study(
+    kind: str, design: str, makers: set[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    size = {} if design == "grid" else {"size": 4}
+    form = {"values": [1]} if design == "grid" else {"low": 1, "high": 2}
+    tables = {"design": {"kind": design, **size}, "parameters": {"height": form}}
+    drawn = thud.read_study(tables, kind)
+    before = drawn.identity
+    monkeypatch.setattr("thud.studies.study.metadata.version", lambda _: "0.0.1")
+    changed = {name for name, text in drawn.identity.items() if text != before[name]}
+    assert changed == {f"{name}_version" for name in makers}
 
 
 @pytest.mark.parametrize("module", [fit, sweep, tables, units])

@@ -21,7 +21,6 @@ from thud.base.files import is_failure, is_one_of, replace_file, require_regular
 from thud.case.case import case_text
 from thud.impact.datasets import FREQUENCIES, RESULTS, attributes, case_attributes, sample_variables
 from thud.studies.kinds import KINDS
-from thud.studies.sampling import sampler_versions
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -84,7 +83,6 @@ def provenance_of(study: Study) -> dict[str, Any]:
         "parameters": " ".join(parameter.coordinate_name for parameter in study.parameters),
         **({"density": study.density} if study.density is not None else {}),
         **({"surrogate": study.surrogate.accuracy} if study.surrogate else {}),
-        **sampler_versions(study.design),
         **case_attributes(study.case),
         "case": case_text(study.case).decode(),
     }

@@ -149,9 +149,8 @@ def run(
         _executor(options) as (executor, limit),
         tqdm(total=study.count, unit="sample", disable=not options.get("progress")) as bar,
     ):
-        bar.update(study.count - sum(_stop(study, start) - start for start in missing))
-        for start, result in _compute(study, missing, executor, limit):
-            columns = study.parameter_columns(start, _stop(study, start))
+        bar.update(max(0, study.count - len(missing) * study.block_size))
+        for start, columns, result in _compute(study, missing, executor, limit):
             block = new_dataset(study, columns, result, provenance)
             if partial:
                 write_dataset(block, _block(partial, start))
@@ -181,11 +180,6 @@ def _block(partial: Path, start: int) -> Path:
     return partial / f"block_{start:012d}.nc"
 
 
-def _stop(study: Study, start: int) -> int:
-    """Return the first sample after the block that begins with a sample."""
-    return min(start + study.block_size, study.count)
-
-
 @contextmanager
 def _executor(options: RunOptions) -> Iterator[tuple[Executor, int]]:
     """Yield the executor, and the number of blocks that it has at a time."""
@@ -210,24 +204,25 @@ def _executor(options: RunOptions) -> Iterator[tuple[Executor, int]]:
 
 def _compute(
     study: Study, starts: Iterable[int], executor: Executor, limit: int
-) -> Iterator[tuple[int, Columns]]:
-    """Yield the first sample of each block with its results, in the order in which they are done.
+) -> Iterator[tuple[int, Columns, Columns]]:
+    """Yield first sample, parameters and results of each block, in the order of their results.
 
     Raises NumericalError if the executor loses a block, after all blocks that are done.
     """
     waiting = iter(starts)
-    running: dict[Future[Columns], int] = {}
+    running: dict[Future[Columns], tuple[int, Columns]] = {}
     try:
         while True:
             for start in islice(waiting, limit - len(running)):
-                columns = study.parameter_columns(start, _stop(study, start))
-                running[_submit(executor, study, study.key_columns(columns), version())] = start
+                stop = min(start + study.block_size, study.count)
+                columns = study.parameter_columns(start, stop)
+                future = _submit(executor, study, study.key_columns(columns), version())
+                running[future] = start, columns
             if not running:
                 return
             done, _ = wait(running, return_when=FIRST_COMPLETED)
             # Blocks that the executor has lost are the last.
             for future in sorted(done, key=lambda f: f.cancelled() or f.exception() is not None):
-                start = running.pop(future)
                 try:
                     result = future.result()
                 except ThudError:
@@ -239,7 +234,7 @@ def _compute(
                         "finished samples are kept; allowed: run the study again"
                     )
                     raise NumericalError(message) from error
-                yield start, result
+                yield *running.pop(future), result
     finally:
         for future in running:
             future.cancel()

@@ -8,6 +8,7 @@ import os
 from collections.abc import Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
+from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -16,12 +17,14 @@ import numpy as np
 from thud.base._schema import MODELS, FiniteElement
 from thud.base.bridge import version
 from thud.base.checks import (
+    MAX_SEED,
     refuse,
     refuse_unknown,
     refuse_value,
     require_array,
     require_choice,
     require_kind,
+    require_whole,
     shown,
 )
 from thud.base.errors import InputError
@@ -30,8 +33,8 @@ from thud.base.toml_tables import read_toml
 from thud.case.case import Case, check_case, impact_only, new_model, read_case
 from thud.case.keys import DENSITY, TEMPERATURE, find_key, value_in, with_values
 from thud.studies.kinds import KINDS
-from thud.studies.parameter import Parameter, read_quantity, read_value, read_varied
-from thud.studies.sampling import read_design, sampler_versions, unit_samples
+from thud.studies.parameter import MAX_VALUES, Parameter, read_quantity, read_value, read_varied
+from thud.studies.sampling import MIN_BASE_SAMPLES, SAMPLED, unit_samples
 from thud.studies.temperature import read_temperature
 
 if TYPE_CHECKING:
@@ -130,7 +133,11 @@ class Study:
     @property
     def identity(self) -> dict[str, str]:
         """Versions and settings on which the results depend, as texts by group and key."""
-        result = {"thud": version(), "kind": self.kind, **sampler_versions(self.design)}
+        result = {"thud": version(), "kind": self.kind}
+        # Other versions may make other points.
+        makers = ("scipy", "SALib") if self.design == "saltelli" else ("scipy",)
+        for name in makers if self.design in SAMPLED else ():
+            result[f"{name.lower()}_version"] = metadata.version(name)
         result["[design]"] = f"{self.design}, size {self.size}, seed {self.seed}"
         result["[parameters]"] = ", ".join(parameter.name for parameter in self.parameters)
         result |= {f"[parameters] {p.name}": str(p) for p in self.parameters}
@@ -355,6 +362,45 @@ def _read_parameter(name: str, entry: object, case: Case, density: float | None)
         refuse("[parameters] bands is not allowed", "bands in [fixed], the same for all samples")
     mean = density if name == DENSITY.name else value_in(case, name)
     return read_varied(name, entry, case, mean)
+
+
+def read_design(
+    table: Mapping[str, Any], allowed: tuple[str, ...], parameters: tuple[Parameter, ...]
+) -> dict[str, Any]:
+    """Return design, size and seed of ``[design]``; the first allowed kind is the default."""
+    design = table.get("kind", allowed[0])
+    if design not in allowed:
+        refuse_value("[design] kind", design, ", ".join(allowed))
+    is_sampled = design in SAMPLED
+    words = ("kind", "size", "seed") if is_sampled else ("kind",)
+    refuse_unknown(f"[design] of kind {design}", table, words)
+    for parameter in parameters:
+        label = f"[parameters] {parameter.name}"
+        if is_sampled and parameter.count:
+            refuse(f"{label}: count is not used by a {design} design", "low, high and scale")
+        if not is_sampled and not parameter.size:
+            refuse(
+                f"{label} has no values for a {design} design",
+                "values = [...], or low, high and count",
+            )
+    if not is_sampled:
+        sizes = [parameter.size for parameter in parameters]
+        if design == "list" and len(set(sizes)) > 1:
+            refuse("[parameters] differ in their number of values", "the same for all")
+        if design == "grid" and math.prod(sizes) > MAX_VALUES:
+            refuse("[parameters] make too many samples", f"up to {MAX_VALUES} in a grid")
+        return {"design": design}
+    size, seed = table.get("size", 0), table.get("seed", 0)
+    minimum = MIN_BASE_SAMPLES if design == "saltelli" else 1
+    require_whole("[design] size", size, minimum, MAX_VALUES)
+    require_whole("[design] seed", seed, 0, MAX_SEED)
+    if design in {"sobol", "saltelli"} and size & (size - 1):
+        near = 1 << size.bit_length() - 1
+        refuse(
+            f"[design] size = {size} breaks the balance of Sobol's points",
+            f"powers of 2, such as {near} or {2 * near}",
+        )
+    return {"design": design, "size": size, "seed": seed}
 
 
 def with_surrogate(study: Study, surrogate: Surrogate | str | os.PathLike[str]) -> Study:
