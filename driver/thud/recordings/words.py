@@ -255,8 +255,8 @@ def read_facts(items: Pairs, unit: str = "", decimal: str = "") -> Facts:
         base, size = size_of(own or titled or kind)
         if rate is None and number * size > 0 and base == kind:
             rate = number * size if kind == "Hz" else 1 / (number * size)
-        date = date or text * (word in DATE)
-        unit = unit or text * (word in UNIT)
+        date = date or (text if word in DATE else "")
+        unit = unit or (text if word in UNIT else "")
     unapplied = (
         f"{title[:MAX_LENGTH]} = {value[:MAX_LENGTH]}"
         for title, value in items
@@ -396,7 +396,8 @@ def _read_pair(text: str) -> tuple[str, str] | None:
     is_pair = word in UNIT | TIME_UNIT or (word in DATE and DATE_LIKE.search(value))
     is_pair = is_pair or (word in RATE | STEP and re.match(r"[-+.]?\d", value))
     # Numbers of factors and offsets, but no date of a calibration.
-    is_number_of = _neutral(word) is not None and re.match(r"[-+.]?\d", value)
+    is_factor = word in _OFFSET or _FACTOR.fullmatch(word)
+    is_number_of = is_factor and re.match(r"[-+.]?\d", value)
     is_pair = is_pair or (is_number_of and not DATE_TIME.fullmatch(value))
     return (name.strip(), value) if value and is_pair else None
 
