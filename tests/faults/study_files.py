@@ -202,7 +202,7 @@ def _target(chance: random.Random) -> object:
         "contact_time": {"value": 19.09, "uncertainty": 0.1, "unit": "ms"},
         "restitution": {"value": 0.81, "uncertainty": 0.01},
     }  # fmt: skip
-    force = {"file": str(INPUTS / "studies/fit_force.csv"), "force": "floor", "time_shift": True}
+    force = {"file": str(INPUTS / "studies/fit_force.csv"), "force": "floor"}
     found = chance.choice(
         [
             *[levels] * 6,

@@ -8,7 +8,6 @@ LIBRARY = "{name} {text}"
 PROCESSING = {
     # Fits.
     "unknowns_included": "unknown, in the intervals: {unknowns}; noise alone: {errors}",
-    "press_included": "unknown, in the intervals as far as the curve does not show it: {unknowns}",
     "not_visible": "not in the intervals, and not visible: {cause} changes {changes}",
     "widened": "intervals widened {value:.3g} times, see the warnings",
     # Surrogates.
@@ -184,11 +183,9 @@ WARNINGS = {
     "the compared frequencies: the noise is not as assumed or the model is wrong",
     "residuals_in_contact": "the residual is {value:.3g} {unit} during the contact and {high:.3g} "
     "{unit} otherwise: the model differs from the force by more than the noise",
-    "residuals_change": "the residuals are {value:.3g} times as large after the contact as before",
-    "background_too_short": "the background lasts {value:.3g} {unit}: offset, hum and color of the "
+    "background_too_short": "the background lasts {value:.3g} {unit}: hum and color of the "
     "noise are not known, and the intervals hold for white noise alone",
-    "touch_at_limit": "the first touch is at the limit of the search; begin the data with it",
-    "larger_than_expected": "the {name} is {value:.2g} times as large as expected",
+    "larger_than_expected": "{name} is {value:.2g} standard deviations from its expected value",
     # Samples.
     "samples_failed": "{value:.0f} of {high:.0f} samples failed; most frequent reason: {reason}",
     "samples_not_standard": "the sources of {value:.0f} of {high:.0f} samples do not conform: "

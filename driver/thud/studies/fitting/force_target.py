@@ -193,7 +193,7 @@ class ForceTarget(Immutable):
             absorbed=(not exact) + 2 * len(background.tones if background else ()), own=own,
             record=record, kind=self.force or assessed, below=self.below, spectrum=spectrum,
             noise=noise, background=background,
-            short=np.nan if known or exact else quiet.seconds,
+            short=np.nan if known or exact or self.noise else quiet.seconds,
         )  # fmt: skip
 
 
