@@ -43,8 +43,8 @@ from thud.impact.compute import compute
 from thud.level.assessment import Criterion
 from thud.level.estimate import Estimate
 from thud.recordings.config import config_from
-from thud.report.contents import criteria_data
-from thud.report.rows import expanded_text, value_text
+from thud.report.contents import report_criteria
+from thud.report.rows import entry_text, expanded_text
 
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator, Iterator
@@ -344,8 +344,8 @@ def test_values_of_a_recording_have_the_digits_of_their_uncertainty(client: Test
     recording = thud.read_recording(
         REPOSITORY / "inputs/recordings/drop_1.wav", height=1, mass=2.5, calibration=CALIBRATION
     )
-    rows = criteria_data(recording)
-    texts = [(value_text(row), expanded_text(row)) for row in rows]
+    rows = report_criteria(recording)
+    texts = [(entry_text(row), expanded_text(row)) for row in rows]
     shown = [(entry["value_text"], entry["uncertainty_text"]) for entry in answer["criteria"]]
     assert shown == texts
 

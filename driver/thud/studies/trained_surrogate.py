@@ -362,7 +362,7 @@ def differing_keys(before: Case, now: Case) -> list[tuple[str, str, str]]:
         {
             f"&{group}: {key}": f"{value!r}"
             for group, keys in impact_only(case).resolved().to_namelist().items()
-            if group not in {"case", "limits"}
+            if group not in {"case", "limits", "output"}
             for key, value in keys.items()
         }
         for case in (before, now)
