@@ -36,6 +36,7 @@ def floor_page(floor: PredictedFloor, section: bytes, figure: bytes) -> str:
         version=version(),
         floor=floor,
         prediction=prediction,
+        warnings=[str(note) for note in prediction.notes],
         box=_box(floor),
         section=section,
         figure=figure,
