@@ -46,7 +46,7 @@ def _format_columns(columns: Sequence[Sequence[str]]) -> str:
     while sum(widths) + len(_GAP) * (len(widths) - 1) > WIDTH:
         reducible = [i for i, minimum in enumerate(minima) if widths[i] > minimum]
         if not reducible:
-            half = len(columns) // 2 + 1
+            half = (len(columns) + 1) // 2
             halves = columns[:half], [columns[0], *columns[half:]]
             return "\n\n".join(map(_format_columns, halves))
         widths[max(reducible, key=widths.__getitem__)] -= 1
