@@ -1,4 +1,4 @@
-"""Fits: parameters of a model from a force history or from levels."""
+"""Fits: parameters of a model from forces of impacts, levels, and curves of presses."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def fit(  # noqa: PLR0913 - options of a search
     unknowns: Sequence[str] = UNKNOWNS,
     progress: bool = False,
 ) -> Fit:
-    """Estimate parameters of a model from a force history or from levels, by least squares.
+    """Estimate parameters of a model from forces, levels and curves of presses, by least squares.
 
     The search takes trust-region reflective steps (`scipy.optimize.least_squares`) within the
     limits; parameters are scaled by their starts. Points where the model fails are rejected.
@@ -114,7 +114,8 @@ def fit(  # noqa: PLR0913 - options of a search
     if not isinstance(target, list):
         target = [target if isinstance(target, Target) else ForceTarget(target)]
     elif not target or not all(isinstance(entry, Target) for entry in target):
-        refuse("target is a list with other entries than targets", "ForceTarget and LevelTarget")
+        kinds = "ForceTarget, LevelTarget and CompressionTarget"
+        refuse("target is a list with other entries than targets", kinds)
     terms = _terms(case, target, bound)
     result = _search(terms, get_ranges(case, bound), options, progress=progress)
     for note in result.warnings:

@@ -21,13 +21,9 @@ if TYPE_CHECKING:
 
 # Orders of the damping laws of rubber, and one between them.
 ORDERS = (ORDER_RANGE[0], sum(ORDER_RANGE) / 2, ORDER_RANGE[1])
+_FRACTIONAL = [{"fractional_order": order} for order in ORDERS]
 # Driving-point resistance of a slab, N s/m: concrete of 75 mm. A force plate stands on more.
 RESISTANCE = 1e5
-
-
-def _damping_laws(name: str) -> list[dict[str, object]]:
-    """Return keys of fractional damping laws; `name` is the key of the law."""
-    return [{name: "fractional", "fractional_order": order} for order in ORDERS]
 
 
 _OTHER_FRICTION = {"none": "stick", "stick": "none"}
@@ -37,13 +33,15 @@ _LAWS = ("kelvin_voigt", "fractional", "constant_loss")
 # models have none: they are farther from a force than these alternatives are from each other.
 _ALTERNATIVES: dict[type, dict[str, Callable[[Any], list[dict[str, object]]]]] = {
     ModalBall: {
-        "damping law": lambda _: _damping_laws("damping_law"),
+        "damping law": lambda _: [{"damping_law": "fractional", **e} for e in _FRACTIONAL],
         "friction": lambda m: [{"floor_friction": _OTHER_FRICTION[m.floor_friction]}],
         "gravity": lambda m: [{"contact_gravity": not m.contact_gravity}],
         "floor": lambda _: [{"resistance": RESISTANCE}],
     },
     FiniteElement: {
-        "damping law": lambda m: _damping_laws("viscosity") if m.viscosity in _LAWS else [],
+        "damping law": lambda m: [
+            {"viscosity": "fractional", **e} for e in _FRACTIONAL if m.viscosity in _LAWS
+        ],
         "friction": lambda m: [{"friction": 0.0 if m.friction else 1.0}],
         "floor": lambda _: [{"resistance": RESISTANCE}],
     },
