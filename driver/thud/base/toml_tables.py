@@ -102,13 +102,12 @@ class TomlTable:
     @property
     def stated(self) -> list[str]:
         """Names of the keys whose values are not the defaults."""
-        values = ((entry, getattr(self, entry.name)) for entry in fields(self))
+        # The default of tables without another one is an empty table.
         return [
             entry.name
-            for entry, value in values
-            if not (
-                value is None or value is entry.default or (isinstance(value, dict) and not value)
-            )
+            for entry in fields(self)
+            if (value := getattr(self, entry.name)) is not None and value is not entry.default
+            if entry.default_factory is not dict or value
         ]
 
     def require(self, *names: str) -> None:
