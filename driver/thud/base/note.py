@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
+from itertools import groupby
 from typing import TYPE_CHECKING
 
 from thud.base.sentences import LIBRARY, PROCESSING, WARNINGS
@@ -48,19 +49,13 @@ class Note:
         return sentence([self])
 
 
-def library_name(subject: str) -> str:
-    """Return how messages of the library call a group, or a group and a key."""
-    group, _, key = subject.partition(".")
-    return f"&{group}: {key}".rstrip()
-
-
 def of_part(part: str, notes: Iterable[Note]) -> list[Note]:
     """Return notes about a part of their subject, such as a load cell."""
     return [replace(note, others={**note.others, "part": part}) for note in notes]
 
 
 class _Range:
-    """Values of one number in several notes, shown as its range; all by the format "list"."""
+    """Values of one number in several notes, shown as its range, or with the format "list"."""
 
     def __init__(self, values: Sequence[float | str]) -> None:
         self.values = values
@@ -68,7 +63,7 @@ class _Range:
     def __format__(self, form: str) -> str:
         ordered = sorted(set(self.values), key=lambda value: (isinstance(value, str), value))
         if form == "list":
-            return ", ".join(format(value, "g") for value in ordered)
+            return _listed([int(value) for value in ordered])
         texts = list(dict.fromkeys(decimal_text(value, form) for value in ordered))
         return texts[0] if len(texts) == 1 else f"{texts[0]} to {texts[-1]}"
 
@@ -100,3 +95,17 @@ def decimal_text(value: float | str, form: str) -> str:
         return value
     text = format(value, form)
     return text if "e" not in text else f"{Decimal(text):f}"
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    """Return ascending numbers as text, three or more in a row as a range.
+
+    >>> _listed([2, 3, 4, 7, 8])
+    '2 to 4, 7, 8'
+    """
+    groups = groupby(enumerate(numbers), lambda pair: pair[1] - pair[0])
+    runs = ([number for _, number in group] for _, group in groups)
+    return ", ".join(
+        f"{run[0]} to {run[-1]}" if len(run) > 2 else ", ".join(map(str, run))  # noqa: PLR2004
+        for run in runs
+    )
