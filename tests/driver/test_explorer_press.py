@@ -90,9 +90,9 @@ def test_curve_that_the_model_does_not_explain_says_so(client: TestClient) -> No
 @pytest.mark.parametrize(
     ("content", "words"),
     [
-        ("force (N)\n1\n2", "0 columns in a unit of m among column 1, 'force' (N); allowed: a col"),
-        ("travel,force (N)\n0,0\n1,2", "of m among column 1, 'travel' (no unit)"),
-        ("travel (mm),way (cm),force (N)\n0,0,0\n1,1,2", "2 columns in a unit of m among column 1"),
+        ("force (N)\n1\n2", "0 columns in a unit of m among force (N)"),
+        ("travel,force (N)\n0,0\n1,2", "of m among travel (no unit)"),
+        ("travel (mm),way (cm),force (N)\n0,0,0\n1,1,2", "2 columns in a unit of m among travel"),
         ("travel (mm),force (N)\n0,0\n1,nan", "column 2, 'force': a value is not finite"),
         ("travel (mm),force (N)\n0,0\n1,2", "press 1.csv: "),
     ],

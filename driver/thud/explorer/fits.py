@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thud.base.checks import refuse
+from thud.base.checks import refuse, shown_text
 from thud.base.errors import ThudError
 from thud.base.units import size_of
 from thud.case.keys import find_key, with_values
@@ -134,7 +134,7 @@ def _column(table: Table, unit: str) -> np.ndarray[Any, np.dtype[np.float64]]:
     columns = [column for column in table.columns if size_of(column.unit)[0] == unit]
     if len(columns) != 1:
         names = ", ".join(
-            f"{column.name or column.number} ({column.unit or 'no unit'})"
+            f"{shown_text(column.name) or f'column {column.number}'} ({column.unit or 'no unit'})"
             for column in table.columns
         )
         refuse(f"{table.name}: {len(columns)} columns in a unit of {unit} among {names}", EXPECTED)
