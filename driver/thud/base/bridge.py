@@ -81,12 +81,12 @@ def _collect(status: int, handle: int, n_byte: int, n_value: int) -> Bundle:
     if status:
         note = None
         if "group" in answer:
-            group, key = answer["group"], answer["key"]
-            value, low, high, *is_open = answer.get("range", [math.nan] * 3 + [0.0] * 2)
-            others = {"name": f"&{group}: {key}".rstrip(), "text": answer["problem"]}
-            others |= dict(zip(("low_open", "high_open"), is_open, strict=True))
-            subject = f"{group}.{key}".rstrip(".")
-            note = Note("refused", subject, value, low, high, others=others)
+            *numbers, low_open, high_open = answer.get("range", [math.nan] * 3 + [0.0] * 2)
+            subject = f"{answer['group']}.{answer['key']}".rstrip(".")
+            note = _note(
+                "refused", subject, answer["problem"], *numbers, low_open=low_open,
+                high_open=high_open,
+            )  # fmt: skip
         raise _ERRORS.get(status, NumericalError)(answer["message"], note)
     return answer
 
@@ -96,17 +96,17 @@ def notes(group: Mapping[str, Any]) -> tuple[Note, ...]:
     if not group:
         return ()
     words = (group[name].split("\n") for name in ("code", "subject", "text"))
+    numbers = (group[name] for name in ("value", "low", "high"))
+    return tuple(map(_note, *words, *numbers))
+
+
+def _note(code: str, subject: str, text: str, *numbers: float, **others: float) -> Note:
+    """Return a note on a key, ``"group.key"``, or a group of the library."""
     # Equal notes have the same NaN.
-    numbers = (
-        [math.nan if math.isnan(value) else float(value) for value in group[name]]
-        for name in ("value", "low", "high")
-    )
-    result = []
-    for code, subject, text, value, low, high in zip(*words, *numbers, strict=True):
-        name, _, key = subject.partition(".")
-        others = {"name": f"&{name}: {key}".rstrip(), "text": text}
-        result.append(Note(code, subject, value, low, high, others=others))
-    return tuple(result)
+    value, low, high = (math.nan if math.isnan(number) else float(number) for number in numbers)
+    name, _, key = subject.partition(".")
+    words: dict[str, float | str] = {"name": f"&{name}: {key}".rstrip(), "text": text}
+    return Note(code, subject, value, low, high, others=words | others)
 
 
 def without_units(columns: Mapping[str, Any]) -> dict[str, Any]:
