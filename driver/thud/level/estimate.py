@@ -108,19 +108,13 @@ class Estimate(Immutable):
         return f"{self.value:.6g} ± {self.uncertainty:.2g} {self.unit}".rstrip()
 
     @classmethod
-    def from_budget(
-        cls,
-        value: float,
-        *contributions: Contribution,
-        upper_bound: bool = False,
-        not_stated: tuple[str, ...] = (),
-    ) -> Self:
+    def from_budget(cls, value: float, *contributions: Contribution) -> Self:
         """Combine contributions (JCGM 100, 5.1.2; degrees of freedom by G.4.1)."""
         terms = [term for term in contributions if term.counted and term.uncertainty]
         combined = math.sqrt(sum(term.uncertainty**2 for term in terms))
         inverse = sum((term.uncertainty / combined) ** 4 / term.freedom for term in terms)
         freedom = 1 / inverse if inverse else math.inf
-        return cls(value, combined, "", freedom, contributions, upper_bound, not_stated)
+        return cls(value, combined, "", freedom, contributions)
 
     @classmethod
     def computed(cls, value: float, error: float) -> Self:
@@ -132,15 +126,12 @@ class Estimate(Immutable):
         return cls.from_budget(value, Contribution(NUMERICAL_ERROR, error / NORMAL_FACTOR))
 
     @classmethod
-    def of_drops(  # noqa: PLR0913 - a mean and what contributes to its uncertainty
+    def of_drops(
         cls,
         value: float,
         samples: Sequence[float] | NDArray[np.float64],
         noises: Sequence[float] | NDArray[np.float64],
         shared: Iterable[Contribution] = (),
-        *,
-        upper_bound: bool = False,
-        not_stated: tuple[str, ...] = (),
     ) -> Self:
         """Return the mean over drops with its budget.
 
@@ -157,8 +148,7 @@ class Estimate(Immutable):
             repeated = Contribution(REPEATABILITY, scatter, count - 1, divisor=math.sqrt(count))
             is_noise = NORMAL_FACTOR * noise.uncertainty > cls.from_budget(value, repeated).expanded
             random = [replace(repeated, counted=not is_noise), replace(noise, counted=is_noise)]
-        lines = (*random, *shared)
-        return cls.from_budget(value, *lines, upper_bound=upper_bound, not_stated=not_stated)
+        return cls.from_budget(value, *random, *shared)
 
     def __sub__(self, other: Estimate) -> Estimate:
         """Return the difference of independent values."""

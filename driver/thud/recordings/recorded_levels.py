@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -153,16 +153,15 @@ def average_levels(
     causes |= instruments
     causes = {name: values for name, values in causes.items() if values.any()}
     estimates = tuple(
-        Estimate.of_drops(
-            float(level[band]), samples[:, band], noises[:, band],
-            [
+        replace(
+            Estimate.of_drops(float(level[band]), samples[:, band], noises[:, band], [
                 Contribution(
                     name, float(values[band]),
                     size=values[band] / AMPLITUDE_DECIBEL if name == CALIBRATION else math.nan,
                     divisor=RECTANGULAR if name in ASSUMED else 1.0,
                 )
                 for name, values in causes.items()
-            ],
+            ]),
             upper_bound=flag[band] == "background", not_stated=not_stated,
         )
         for band in range(len(level))
