@@ -387,6 +387,5 @@ def criterion_quantity(name: str) -> Quantity:
 
 def octave_limits(source: LimitsSource) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the minimum and maximum conforming octave levels of a source, dB, shape (5,)."""
-    require_choice("source", source, SOURCES)
     lower, upper = np.array([limits for _, unit, *limits in LIMITS[source] if unit == "dB"]).T
     return lower, upper

@@ -30,7 +30,6 @@ STANDARDS = {
     ),
     "tyre": "JIS A 1418-2:2019 (tables A.1 and A.2)",
 }
-LEVEL_METHODS: tuple[LevelsMethod, ...] = get_args(LevelsMethod)
 FORCES: tuple[LevelsForce, ...] = ("elastic", "floor")
 # Upper limit of the band of a force plate, Hz (paper, section 3).
 RECORDED_BAND = 1250.0
@@ -120,7 +119,7 @@ def force_exposure_levels(
         rate, the bands or the method are invalid.
     """
     require_choice("bands", bands, BANDWIDTHS)
-    require_choice("method", method, LEVEL_METHODS)
+    require_choice("method", method, get_args(LevelsMethod))
     record = require_array("force", force, (1,), "iuf")
     require_number("sample_rate", sample_rate)
     answer = ask("levels", force=record, sample_rate=sample_rate, bands=bands, method=method)
