@@ -15,7 +15,7 @@ from test_figure_look import assert_clean
 import thud
 from thud import cli
 from thud.base import files
-from thud.case.constructions import construction_rows
+from thud.case.constructions import CEILING_KEYS, construction_rows
 from thud.report.predicted_floor import PredictedFloor
 
 if TYPE_CHECKING:
@@ -54,18 +54,12 @@ def level_below(name: str) -> float:
     return thud.predict_level(thud.solve(case)).rating.level
 
 
-def test_library_holds_every_file_under_a_name_of_its_own() -> None:
-    library = thud.constructions()
-    assert len(library) == len(FILES) > 30
-    names = {tomllib.loads(path.read_text(encoding="utf-8"))["name"] for path in FILES}
-    assert names == set(library)
-
-
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_file_is_a_floor_whose_values_have_sources(path: Path) -> None:
     content = tomllib.loads(path.read_text(encoding="utf-8"))
     entry = thud.construction(path)
-    assert entry == thud.construction(content["name"])
+    # A name of its own.
+    assert entry == thud.construction(content["name"]) == thud.constructions()[content["name"]]
     stated = content["keys"] | content.get("room", {})
     assert set(entry.sources) == set(stated)
     for key, cell in stated.items():
@@ -119,18 +113,14 @@ def test_construction_agrees_with_the_case_of_this_floor(name: str, case: str) -
         thud.read_case(REPOSITORY / f"inputs/floors/{case}.nml"),
     )
     assert type(ours.floor) is type(known.floor)
+    ceiling = vars(known.room) if known.room and known.room.ceiling_mass else {"ceiling_mass": 0}
+    expected = vars(known.floor) | {k: v for k, v in ceiling.items() if k in CEILING_KEYS}
     # Some of these cases have the source in the middle, and rounded keys.
-    for key, value in vars(ours.floor).items():
+    for key, other in expected.items():
         if key not in {"source_x", "source_y"}:
-            other = getattr(known.floor, key)
+            value = getattr(ours.room if key in CEILING_KEYS else ours.floor, key)
             is_number = isinstance(value, float)
             assert value == (pytest.approx(other, rel=0.005) if is_number else other), key
-    assert ours.room is not None
-    assert known.room is not None
-    assert ours.room.ceiling_mass == known.room.ceiling_mass
-    if known.room.ceiling_mass:
-        for key in ("ceiling_depth", "ceiling_loss_factor"):
-            assert getattr(ours.room, key) == getattr(known.room, key)
 
 
 @pytest.mark.parametrize(
@@ -241,24 +231,20 @@ def test_file_of_a_user_is_a_construction(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "parts"),
     [
-        ('name = "mine"\n', "", ("name", "missing")),
-        ('kind = "concrete"', 'kind = ""', ("kind", "missing")),
+        ('name = "mine"\n', "", ("name", "missing")), ('"concrete"\n', '""\n', ("kind", "missing")),
         ('floor = "plate"', 'floor = "plat"', ("floor", "plat", "plate")),
         ('floor = "plate"', 'flor = "plate"', ("flor", "floor")),
         ("thickness = { value", "thicknes = { value", ("thicknes", "thickness")),
         ("value = 0.2,", "value = 9,", ("plate", "thickness", 9, "2 m")),
-        ("value = 0.2,", "value = 'thick',", ("thickness", "thick")),
         (', source = "drawing"', "", ("thickness", "source")),
         ('"drawing"', '" "', ("thickness", "source", "text")),
         ("ceiling_mass", "volume", ("room", "volume", "ceiling_mass")),
-        ("value = 12,", "value = -12,", ("room", "ceiling_mass", "-12")),
-        ("[room]\n", "[rooms]\n", ("rooms", "room")),
+        ("[room]\n", "[rooms]\n", ("rooms", "room")), ("[keys]\n", "[keys\n", ("TOML",)),
         ("density = 960 }]", "density = 0 }]", ("layer", 2, "density", 0)),
         (", density = 960 }]", "}]", ("layer", 2, "density")),
-        ("[keys]\n", "[keys\n", ("TOML",)),
     ],
     ids=lambda value: str(value)[:20],
-)
+)  # fmt: skip
 def test_bad_file_is_refused_in_one_sentence(
     old: str, new: str, parts: tuple[object, ...], tmp_path: Path
 ) -> None:
@@ -325,11 +311,11 @@ def test_command_lists_constructions(capsys: pytest.CaptureFixture[str]) -> None
 
 
 def test_command_refuses_what_is_no_floor(errors_of: ErrorsOf) -> None:
-    assert "no floor" in errors_of("floor")
-    assert "'concrete 180'" in errors_of("floor", "--construction", "conrete 180")
-    twice = ("--construction", "concrete 180") * 2
-    assert "also names another floor" in errors_of("floor", *twice)
-    assert "marble" in errors_of("floor", "--list", "marble")
+    for arguments, word in (
+        ((), "--list"), (("--construction", "concrete 180") * 2, "'concrete 180'"),
+        (("--list", "marble"), "marble"),
+    ):  # fmt: skip
+        assert word in errors_of("floor", *arguments)
 
 
 def test_inputs_of_a_clone_are_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -351,11 +337,10 @@ def test_construction_has_the_sides_of_the_case() -> None:
         return case.floor.length, case.floor.width
 
     assert sides(None) == (5.0, 4.0)
-    assert sides(None, length=6.2, width=5.0) == (6.2, 5.0)
-    assert sides(plate) == (7.0, 6.0)
-    assert sides(plate, length=6.2) == (7.0, 6.0)
-    assert sides(plate, length=6.2, width=5.0) == (6.2, 5.0)
-    assert sides(plate, length=6.2, width=5.0, corner_x=0.5) == (7.0, 6.0)
+    for floor in (None, plate):
+        assert sides(floor, length=6.2, width=5.0) == (6.2, 5.0)
+    for room in ({}, {"length": 6.2}, {"length": 6.2, "width": 5.0, "corner_x": 0.5}):
+        assert sides(plate, **room) == (7.0, 6.0)
 
 
 @pytest.mark.parametrize(
@@ -410,12 +395,12 @@ def test_room_alone_is_that_of_the_constructions(tmp_path: Path, errors_of: Erro
 def test_room_larger_than_its_floor_names_the_floor(tmp_path: Path, errors_of: ErrorsOf) -> None:
     path = tmp_path / "large.nml"
     for keys, words in (
-        ("length = 6.2", "the room is 6.2 m long, the floor 5.0 m: state length of the floor"),
-        ("width = 4.5", "the room is 4.5 m wide, the floor 4.0 m: state width of the floor"),
-        ("length = 4.5 corner_x = 1", "corner_x + length = 5.5 m"),
+        ("length = 6.2", ("6.2 m", "5.0 m", "length")),
+        ("width = 4.5", ("4.5 m", "4.0 m", "width")),
+        ("length = 4.5 corner_x = 1", ("corner_x", "5.5 m")),
     ):
         path.write_text(f"&floor name = 'plate' /\n&plate /\n&room {keys} /\n")
-        assert words in errors_of("floor", path)
+        assert re.search(naming("floor", *words), errors_of("floor", path))
 
 
 @pytest.mark.parametrize(
@@ -442,6 +427,6 @@ def test_what_is_no_construction_is_refused(
 def test_names_ignore_case_and_commas(name: str) -> None:
     entry = thud.construction(name)
     assert entry.name == "concrete 180, screed on 15 MN/m3"
-    assert entry in thud.constructions(name)
-    assert entry.name in thud.constructions()
-    assert entry not in thud.constructions("timber")
+    for entry_or_name in (entry, entry.name):
+        assert entry_or_name in thud.constructions(name)
+        assert entry_or_name not in thud.constructions("timber")
