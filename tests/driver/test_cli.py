@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from conftest import INPUTS, MINIMAL, REPOSITORY, RESULT_FILES, contents, names_in, naming, python
+from conftest import MINIMAL, REPOSITORY, RESULT_FILES, contents, names_in, naming, python
 
 import thud
 from thud import cli
@@ -38,8 +38,7 @@ def test_run_writes_the_same_bytes_again(case_file: CaseFile, tmp_path: Path) ->
     assert cli.main(arguments) == 0
     before = contents(tmp_path / "outputs/ball")
     assert cli.main(arguments) == 0
-    after = contents(tmp_path / "outputs/ball")
-    assert before == after
+    assert contents(tmp_path / "outputs/ball") == before
 
 
 def test_run_agrees_with_the_executable(run: Run, case_file: CaseFile, tmp_path: Path) -> None:
@@ -50,20 +49,17 @@ def test_run_agrees_with_the_executable(run: Run, case_file: CaseFile, tmp_path:
         assert path.read_bytes() == (tmp_path / "driver" / path.name).read_bytes()
 
 
-@pytest.mark.slow
-def test_several_cases_have_their_own_directories(tmp_path: Path) -> None:
-    paths = list(map(str, INPUTS))
-    assert cli.main(["run", "--no-figures", "-q", "-o", "all", *paths]) == 0
-    assert names_in(tmp_path / "all") == sorted(path.stem for path in INPUTS)
-
-
 def test_bad_case_does_not_stop_the_others(
     case_file: CaseFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    good = case_file(MINIMAL, "good.nml")
-    bad = case_file("&ball", "bad.nml")
-    assert cli.main(["run", "-q", "--no-figures", str(bad), "nowhere.nml", str(good)]) == 1
-    assert (tmp_path / "outputs/good/summary.nml").exists()
+    bad, good, last = (
+        str(case_file(text, f"{name}.nml"))
+        for name, text in (("bad", "&ball"), ("good", MINIMAL), ("last", MINIMAL))
+    )
+    run = ["run", "-q", "--no-figures", "-o", "all"]
+    assert cli.main([*run, bad, "nowhere.nml", good, last]) == 1
+    assert names_in(tmp_path / "all") == ["good", "last"]
+    assert (tmp_path / "all/good/summary.nml").exists()
     errors = capsys.readouterr().err
     assert re.search(naming(bad, "&ball", "line 1"), errors)
     assert "nowhere.nml" in errors
@@ -72,12 +68,10 @@ def test_bad_case_does_not_stop_the_others(
 @pytest.mark.parametrize(
     ("text", "check", "code"),
     [
-        (MINIMAL, False, 0),
-        (MINIMAL, True, 3),
-        ("&ball", True, 1),
+        (MINIMAL, False, 0), (MINIMAL, True, 3), ("&ball", True, 1),
         ("&ball / &drop height = 5000 / &model /", True, 2),
     ],
-)
+)  # fmt: skip
 def test_exit_codes_are_those_of_the_executable(
     run: Run, case_file: CaseFile, text: str, code: int, *, check: bool
 ) -> None:
@@ -143,50 +137,34 @@ def test_version_is_that_of_the_library(capsys: pytest.CaptureFixture[str]) -> N
 def test_results_that_cannot_be_saved_are_told(
     case_file: CaseFile, tmp_path: Path, errors_of: ErrorsOf
 ) -> None:
-    (tmp_path / "file").write_text("")
-    for folder, word in (("file/drawn", "file/drawn"), (" ", "--output")):
-        assert word in errors_of("run", "-q", str(case_file(MINIMAL)), "-o", folder)
-
-
-def test_figure_that_cannot_be_replaced_is_named(
-    case_file: CaseFile, tmp_path: Path, errors_of: ErrorsOf
-) -> None:
     case = str(case_file(MINIMAL))
-    assert cli.main(["run", "-q", case]) == 0
-    (tmp_path / "outputs/case/force.svg").unlink()
-    (tmp_path / "outputs/case/force.svg").mkdir()
-    assert "outputs/case/force.svg" in errors_of("run", "-q", case)
-
-
-# All of them write to standard output; runs of two cases are told once.
-SPEAKING = (
-    "--help",
-    "--version",
-    "fit --help",
-    "run --no-figures case.nml other.nml",
-)
-
-
-def speak(arguments: str, screen: str, unbuffered: str, folder: Path) -> tuple[int, str]:
-    """Return exit code and errors of a command with a screen as the shell redirects it."""
-    command = f"{{ {sys.executable} -m thud {arguments} 2> errors; echo $? > code; }} {screen}"
-    environment = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
-    subprocess.run(["/bin/sh", "-c", command], cwd=folder, env=environment, check=False)
-    return int((folder / "code").read_text()), (folder / "errors").read_text()
+    (tmp_path / "file").write_text("")
+    assert cli.main(["run", "-q", "-o", "old", case]) == 0
+    (tmp_path / "old/force.svg").unlink()
+    (tmp_path / "old/force.svg").mkdir()
+    for folder, word in ((" ", "--output"), ("file/drawn", "file/drawn"), ("old", "old/force.svg")):
+        assert word in errors_of("run", "-q", case, "-o", folder)
 
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])
-@pytest.mark.parametrize("arguments", SPEAKING)
+# All of them write to standard output; runs of two cases are told once.
+@pytest.mark.parametrize("arguments", ["--version", "fit --help", "run --no-figures a.nml b.nml"])
 def test_full_screen_is_told_in_one_sentence(
     arguments: str, unbuffered: str, case_file: CaseFile, tmp_path: Path
 ) -> None:
-    case_file(MINIMAL)
-    case_file(MINIMAL, "other.nml")
-    code, errors = speak(arguments, "> /dev/full", unbuffered, tmp_path)
-    assert code == 1
-    assert errors.count("standard output") == 1
-    assert "Traceback" not in errors
-    assert "ignored" not in errors
+    for name in ("a.nml", "b.nml"):
+        case_file(MINIMAL, name)
+    environment = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
+    command = [sys.executable, "-m", "thud", *arguments.split()]
+    with Path("/dev/full").open("w", encoding="utf-8") as screen:
+        done = subprocess.run(
+            command, cwd=tmp_path, env=environment, check=False, text=True, stdout=screen,
+            stderr=subprocess.PIPE,
+        )  # fmt: skip
+    assert done.returncode == 1
+    assert done.stderr.count("standard output") == 1
+    assert "Traceback" not in done.stderr
+    assert "ignored" not in done.stderr
 
 
 @pytest.mark.parametrize("start", [["thud-driver"], [sys.executable, "-P", "-m", "thud"]])
