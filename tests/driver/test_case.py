@@ -107,27 +107,28 @@ def test_values_of_other_types_are_refused(value: object) -> None:
 @pytest.mark.parametrize("name", ["a\nb", "a\tb", "a\0b"], ids=repr)
 def test_names_are_plain_text(name: str) -> None:
     with pytest.raises(thud.InputError, match=naming("&case: name", repr(name))):
-        thud.solve(thud.Case(name=name))
+        thud.Case(name=name)
 
 
-@pytest.mark.parametrize("name", ["a" + 300 * " " + "b", "a" * 129, "a\\b", "a/b"])
-def test_name_is_refused_and_not_cut(case_file: CaseFile, name: str) -> None:
-    with pytest.raises(thud.InputError, match="&case: name"):
-        thud.read_case(case_file(f"&case\n name = '{name}'\n/\n&model /\n"))
+LONG = 2000 * "x"
 
 
-def test_long_value_does_not_hide_what_is_allowed(case_file: CaseFile) -> None:
-    long = 2000 * "x"
-    for text, allowed in (
-        (f"&model name = '{long}' /", "'hollow_sphere'"),
-        (f"&{long} /", "'ball'"),
-        (f"&ball {long} = 1 /", "'mass'"),
-    ):
-        with pytest.raises(thud.InputError) as refused:
-            thud.read_case(case_file(f"{text}\n"))
-        sentence = str(refused.value)
-        assert allowed in sentence
-        assert 81 * "x" not in sentence
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        *((f"&case\n name = '{name}'\n/\n&model /", "&case: name")
+          for name in ("a" + 300 * " " + "b", "a" * 129, "a\\b", "a/b")),
+        (f"&model name = '{LONG}' /", "'hollow_sphere'"), (f"&{LONG} /", "'ball'"),
+        (f"&ball {LONG} = 1 /", "'mass'"),
+    ],
+)  # fmt: skip
+def test_long_text_is_refused_and_does_not_hide_what_is_allowed(
+    text: str, word: str, case_file: CaseFile
+) -> None:
+    with pytest.raises(thud.InputError) as refused:
+        thud.read_case(case_file(f"{text}\n"))
+    assert word in str(refused.value)
+    assert LONG[:81] not in str(refused.value)
 
 
 def test_errors_of_a_file_name_the_file(case_file: CaseFile) -> None:
