@@ -19,12 +19,16 @@ from thud.recordings.background import (
     remove_background,
     uniform_cells,
 )
+from thud.recordings.config import Config
 from thud.recordings.contact import Contact, find_contact
 from thud.recordings.drops import Section
+from thud.recordings.instruments import Plate, RecorderFilter
 from thud.recordings.repair import check_aliasing
 from thud.recordings.signal import Signal
 
 RATE = 25600.0
+# Instruments without an effect.
+FLAT = Config(plate=Plate(f0=1e6, Q=1.0, share=1.0), filter=RecorderFilter("none"))
 
 
 @pytest.mark.parametrize("before", [1.0, 0.01])
@@ -80,11 +84,12 @@ def test_covariance_of_functionals_is_that_of_samples() -> None:
 
 
 def test_peak_has_the_uncertainty_of_its_place() -> None:
-    quiet = make_drop(0.0, RATE).contact
+    quiet_drop = make_drop(0.0, RATE)
+    quiet = quiet_drop.contact
     n_cell = len(quiet.covariance)
     # That of the background grows from cell to cell; the peak lies in the middle one.
     slope = replace(quiet, covariance=np.diag(np.arange(1.0, n_cell + 1)))
-    found = measured_drop._peak(slope)  # noqa: SLF001
+    found = measured_drop._peak(replace(quiet_drop, contact=slope), FLAT)  # noqa: SLF001
     margin = int(np.ceil(measured_drop.PEAK_MARGIN * RATE))
     low = low_pass(np.pad(quiet.gated, margin), RATE)
     low = resample(low, 2 * len(low))
@@ -95,7 +100,7 @@ def test_peak_has_the_uncertainty_of_its_place() -> None:
 
 def test_peak_is_less_what_noise_adds_and_as_uncertain() -> None:
     """Maxima of many noisy records: their mean error is part of their uncertainty."""
-    found = [measured_drop._peak(make_drop(20.0, RATE, seed=seed).contact) for seed in range(40)]  # noqa: SLF001
+    found = [measured_drop._peak(make_drop(20.0, RATE, seed=seed), FLAT) for seed in range(40)]  # noqa: SLF001
     clean = low_pass(np.pad(make_drop(0.0, RATE).contact.gated, 2), RATE).max()
     error = np.array([one.value for one in found]) - clean
     stated = np.array([one.uncertainty for one in found])

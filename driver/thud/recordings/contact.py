@@ -18,7 +18,13 @@ from scipy.special import comb
 from thud.impact.contact_time import AVERAGING_WIDTH, THRESHOLD, average_within
 from thud.level.estimate import Estimate
 from thud.level.levels import low_pass
-from thud.recordings.background import MAINS, N_HARMONIC, cell_means, uniform_cells
+from thud.recordings.background import (
+    MAINS,
+    N_HARMONIC,
+    cell_means,
+    remove_background,
+    uniform_cells,
+)
 from thud.recordings.drops import MAX_BACKGROUND, Stage, robust_deviation
 
 if TYPE_CHECKING:
@@ -116,6 +122,8 @@ class Contact(Stage):
         The fitted background and its noise.
     sample_rate : float
         Samples per second, Hz.
+    landing : Estimate or None
+        First touch of the first bounce; None if it is not recorded.
     """
 
     touch: Estimate
@@ -129,6 +137,7 @@ class Contact(Stage):
     covariance: NDArray[np.float64]
     background: Background
     sample_rate: float
+    landing: Estimate | None = None
 
     @property
     def gated(self) -> NDArray[np.float64]:
@@ -209,7 +218,10 @@ class Contact(Stage):
 
 
 def find_contact(section: Section, force: NDArray[np.float64], background: Background) -> Contact:
-    """Return the contact of a section; `force` is that without its background, N, shape (n,)."""
+    """Return the contact of a section; `force` is that without its background, N, shape (n,).
+
+    The bounce has the noise of `background`.
+    """
     rate, chain = section.sample_rate, section.chain
     touch, begin = find_edge(section, force, background, side=1)
     release, end = find_edge(section, force, background, side=-1)
@@ -224,11 +236,16 @@ def find_contact(section: Section, force: NDArray[np.float64], background: Backg
     touch, release, begin, end = (
         replace(edge, value=edge.value - start / rate) for edge in (touch, release, begin, end)
     )
+    landing, bounce = None, section.bounce
+    if bounce:
+        landing = find_edge(bounce, *remove_background(bounce, background), side=1)[0]
+        delay = (bounce.start - section.start - start) / rate
+        landing = replace(landing, value=delay + landing.value)
     return Contact(
         touch, release, begin, end, start, force[shown],
         (section.force - force)[shown], (first - start, stop - start),
         background.error_covariance(uniform_cells(first, stop, rate)),
-        background, rate,
+        background, rate, landing,
     )  # fmt: skip
 
 

@@ -17,7 +17,7 @@ from thud.base.checks import refuse, refuse_value, require_pair, require_whole
 from thud.base.note import Note
 from thud.base.toml_tables import TomlTable, between, key, one_of
 from thud.level.estimate import RECTANGULAR
-from thud.level.levels import get_bands, low_pass
+from thud.level.levels import get_bands
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -374,17 +374,6 @@ def mean_level_changes(
             after[name] += below[stop] - below[first]
     with np.errstate(invalid="ignore"):  # a band above half the rate
         return {name: 10 * np.log10(values / before) for name, values in after.items()}
-
-
-def peak_uncertainty(drop: Drop, config: Config) -> float:
-    """Return the standard uncertainty of a peak by instruments that are not stated, N."""
-    rate, force = drop.contact.sample_rate, np.pad(drop.contact.gated, 2)
-    peaks = [
-        low_pass(filtered(force, rate, gain, len(force)), rate).max()
-        for name, gain, _ in find_effects([drop], config)
-        if name in ASSUMED
-    ]
-    return math.hypot(*(np.array(peaks) - low_pass(force, rate).max())) / RECTANGULAR
 
 
 def check_instruments(

@@ -21,9 +21,9 @@ from thud.base.note import Note
 from thud.level.estimate import RECTANGULAR, UNKNOWN, Contribution, Estimate
 from thud.level.levels import RECORDED_BAND, low_pass
 from thud.recordings.background import remove_background
-from thud.recordings.contact import SAMPLE_ERROR, Contact, find_contact, find_edge
+from thud.recordings.contact import SAMPLE_ERROR, Contact, find_contact
 from thud.recordings.drops import Section, Stage, robust_deviation
-from thud.recordings.instruments import correct, peak_uncertainty
+from thud.recordings.instruments import ASSUMED, correct, filtered, find_effects
 from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.repair import check_aliasing, repair
 from thud.recordings.ringing import find_ringing, is_in_record
@@ -225,8 +225,7 @@ def measure_drop(
     ones = np.full((1, len(contact.gated)), 1 / contact.sample_rate)
     variance = contact.covariance_of(ones)[0, 0]
     impulse = Estimate(float((ones @ contact.gated)[0]), math.sqrt(variance))
-    peak_force = _peak(contact)
-    landing = _first_landing(section, contact)
+    landing = contact.landing
     if landing and section.bounce and config.height:
         # The force of a bounce follows its velocity, and so does the flight before it.
         flight, bounce = landing - contact.release, section.bounce
@@ -258,7 +257,7 @@ def measure_drop(
         section.name, onset, contact,
         contact_time=contact_time,
         restitution=estimates[RESTITUTION],
-        peak_force=peak_force,
+        peak_force=UNKNOWN,
         impulse=impulse,
         effective_mass=estimates[MASS],
         restitutions=restitutions,
@@ -268,39 +267,35 @@ def measure_drop(
         ringing=ringing,
         plate_recorded=is_in_record(recorded, contact, plate) if recorded and plate else None,
     )  # fmt: skip
-    return replace(drop, peak_force=peak_force.widened(peak_uncertainty(drop, config)))
+    return replace(drop, peak_force=_peak(drop, config))
 
 
-def _first_landing(section: Section, contact: Contact) -> Estimate | None:
-    """Return the first touch of the first bounce, in the time of a contact, s; None if unknown."""
-    bounce = section.bounce
-    if bounce is None:
-        return None
-    force, background = remove_background(bounce, contact.background)
-    touch = find_edge(bounce, force, background, side=1)[0]
-    delay = (bounce.start - section.start - contact.start) / section.sample_rate
-    return replace(touch, value=delay + touch.value)
-
-
-def _peak(contact: Contact) -> Estimate:
+def _peak(drop: Drop, config: Config) -> Estimate:
     """Return the maximum of the force below 1.25 kHz, N.
 
     Noise increases a maximum by about its standard deviation, which is subtracted; the uncertainty
-    has it twice.
+    has it twice, and the effects of instruments that are not stated.
     """
+    contact, background, force = drop.contact, drop.contact.background, drop.contact.gated
     rate, margin = contact.sample_rate, math.ceil(PEAK_MARGIN * contact.sample_rate)
-    low = low_pass(np.pad(contact.gated, margin), rate)
+    low = low_pass(np.pad(force, margin), rate)
     # The peak may lie between samples.
     factor = math.ceil(PEAK_RATE / rate)
     low = resample(low, factor * len(low)) if factor > 1 else low
-    index = int(np.clip(np.argmax(low) // factor - margin, 0, len(contact.gated) - 1))
-    cell = index * len(contact.covariance) // len(contact.gated)
-    density = float(contact.background.density(RECORDED_BAND))
-    noise = math.sqrt(density * min(RECORDED_BAND, rate / 2))
-    variance = 2 * noise**2 + (SAMPLE_ERROR * contact.background.peak) ** 2
+    index = int(np.clip(np.argmax(low) // factor - margin, 0, len(force) - 1))
+    cell = index * len(contact.covariance) // len(force)
+    noise = math.sqrt(float(background.density(RECORDED_BAND)) * min(RECORDED_BAND, rate / 2))
+    variance = 2 * noise**2 + (SAMPLE_ERROR * background.peak) ** 2
     # The top stays within a step for some time: its error is that of the offset again.
-    variance += contact.covariance[cell, cell] + 2 * contact.background.quantization.offset**2
-    return Estimate(float(low.max()) - noise, math.sqrt(variance))
+    variance += contact.covariance[cell, cell] + 2 * background.quantization.offset**2
+    force = np.pad(force, 2)
+    peaks = [
+        low_pass(filtered(force, rate, gain, len(force)), rate).max()
+        for name, gain, _ in find_effects([drop], config)
+        if name in ASSUMED
+    ]
+    assumed = math.hypot(*(np.array(peaks) - low_pass(force, rate).max())) / RECTANGULAR
+    return Estimate(float(low.max()) - noise, math.hypot(math.sqrt(variance), assumed))
 
 
 def shared_causes(config: Config, calibration: float | None) -> dict[str, Contribution]:

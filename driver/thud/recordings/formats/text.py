@@ -19,7 +19,6 @@ from thud.base.checks import refuse, shown_text
 from thud.base.errors import InputError
 from thud.base.extras import require_extra
 from thud.base.files import regular_file, require_small
-from thud.base.immutable import freeze
 from thud.base.units import factor_to, size_of
 from thud.recordings.formats import MIN_SAMPLES, Channel, rises, uniform_grid
 from thud.recordings.words import (
@@ -79,7 +78,7 @@ class Column:
     name, unit : str
         Title, and unit as the file states it; empty if there is none.
     values : ndarray, shape (n_row,)
-        The numbers in the unit of the file.
+        The numbers in the unit of the file; read-only.
     is_time : bool
         Whether title or unit are those of times.
     label : str
@@ -150,7 +149,7 @@ def read_channels(path: Path) -> list[Channel]:
     for c in table.columns:
         facts = read_facts(table.header, c.unit)
         channel = Channel(
-            c.name, c.number, rows, freeze(c.values), c.unit, rate, date=facts.date, notes=notes,
+            c.name, c.number, rows, c.values, c.unit, rate, date=facts.date, notes=notes,
             unapplied=facts.unapplied,
         )  # fmt: skip
         channels += [] if c is time else [channel]
@@ -194,8 +193,9 @@ def read_table(path: str | os.PathLike[str], allowed: str = ALLOWED) -> Table:
         raise
     except (OSError, ValueError) as error:
         refuse(f"{name}: cannot be read ({shown_text(error)})", allowed, error)
-    columns = []
-    for i, numbers in zip(layout.units, values.T.copy(), strict=True):
+    columns, values = [], values.T.copy()
+    values.setflags(write=False)
+    for i, numbers in zip(layout.units, values, strict=True):
         title, unit = titles[i]
         label = f"{name}: column {i + 1}" + (f", {shown_text(title)!r}" if title else "")
         columns.append(Column(i + 1, title, unit, numbers, is_time(title, unit), label))
