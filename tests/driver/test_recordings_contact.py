@@ -61,28 +61,6 @@ def test_cells_have_their_samples_and_means() -> None:
     np.testing.assert_allclose(mean, [force[first:stop].mean() for first, stop in expected])
 
 
-def with_covariance(seed: int = 1) -> Contact:
-    one = make_drop(3.0, RATE).contact
-    root = np.random.default_rng(seed).normal(size=one.covariance.shape)
-    return replace(one, covariance=root @ root.T)
-
-
-def sample_covariance(one: Contact) -> np.ndarray:
-    """Return the covariance of the samples of the gate: white noise, and the error of each cell."""
-    count, n_cell = len(one.gated), len(one.covariance)
-    edges = np.rint(np.linspace(0, count, n_cell + 1))
-    cell = np.searchsorted(edges, np.arange(count), "right") - 1
-    white = one.background.variances[0] * one.sample_rate / 2
-    return one.covariance[np.ix_(cell, cell)] + white * np.eye(count)
-
-
-def test_covariance_of_functionals_is_that_of_samples() -> None:
-    one = with_covariance()
-    rows = np.random.default_rng(2).normal(size=(3, len(one.gated)))
-    expected = rows @ sample_covariance(one) @ rows.T
-    np.testing.assert_allclose(one.covariance_of(rows), expected, rtol=1e-9)
-
-
 def test_peak_has_the_uncertainty_of_its_place() -> None:
     quiet_drop = make_drop(0.0, RATE)
     quiet = quiet_drop.contact

@@ -18,7 +18,6 @@ from synthetic import make_drop, with_force
 import thud
 from thud.level.assessment import assess_levels
 from thud.level.estimate import Contribution, Estimate
-from thud.recordings.background import Background, cell_means, uniform_cells
 from thud.recordings.checks import outliers
 from thud.recordings.checks.outliers import find_outliers
 from thud.recordings.checks.plate import check_plate
@@ -98,34 +97,6 @@ def test_half_sine_by_all_methods(rate: int) -> None:
         )
 
 
-@pytest.mark.parametrize("bands", ["octave", "third"])
-@pytest.mark.parametrize("rate", [2500.0, 25600.0, 96000.0])
-def test_expected_noise_energy_is_that_of_its_density(bands: str, rate: float) -> None:
-    drop = make_drop(3.0, rate)
-    edges = thud.get_bands(bands)
-    found = band_noise([drop], edges)[0, :, 0]
-    white = drop.contact.background.variances[0]
-    expected = white * (edges.upper - edges.lower) * np.diff(drop.gate) / rate
-    offset = drop.contact.covariance[0, 0] / (white * rate / 2) * np.diff(drop.gate)
-    # The offset adds at most its part of the energy of the noise.
-    assert (found >= expected * (1 - 1e-9)).all()
-    assert (found <= expected * (1 + offset)).all()
-
-
-def test_many_drops_at_once_are_those_one_by_one() -> None:
-    """Gates of different lengths and rates share functionals, which must not change a level."""
-    drops = [make_drop(2.0, rate, seed=i) for i, rate in enumerate((25600.0, 8000.0, 25600.0))]
-    longer = (drops[0].gate[0] - 9, drops[0].gate[1])
-    contact = replace(drops[0].contact, gate=longer)
-    drops[0] = replace(drops[0], contact=contact)
-    together = measure_levels(drops, "third")
-    for k, drop in enumerate(drops):
-        alone = measure_levels([drop], "third")
-        np.testing.assert_allclose(together.level[k], alone.level[0], rtol=0, atol=1e-12)
-        np.testing.assert_allclose(together.background[k], alone.background[0], rtol=0, atol=1e-9)
-        np.testing.assert_allclose(together.uncertainty[k], alone.uncertainty[0], rtol=1e-9)
-
-
 def test_uncertain_density_adds_to_the_energy_of_a_band() -> None:
     drop, bands = make_drop(5.0), thud.get_bands()
     background = drop.contact.background
@@ -135,42 +106,6 @@ def test_uncertain_density_adds_to_the_energy_of_a_band() -> None:
     exact, doubtful = band_noise([drop, replace(drop, contact=contact)], bands)
     np.testing.assert_allclose(doubtful[:, 0], exact[:, 0])
     np.testing.assert_allclose(doubtful[:, 1], np.hypot(exact[:, 1], exact[:, 0] / 8))
-
-
-def test_noise_that_rises_towards_0_hz() -> None:
-    """Brown noise, 1/f**2, less its prediction from the quiet, against realisations."""
-    rate, count, density = 8000.0, 60, 100.0
-    drop = make_drop(rate=rate)
-    quiet = [np.arange(0, drop.gate[0], 8), np.arange(drop.gate[1], len(drop.time), 8)]
-    contact = uniform_cells(*drop.gate, rate)
-    variances = np.array([1e-9, 0, density, 0, 0])
-    rng = np.random.default_rng(3)
-    # Increments of the variance 2 pi**2 S f**2 / rate give the density S.
-    deviation = math.sqrt(2 * np.pi**2 * density / rate)
-    energies = []
-    for _ in range(count):
-        noise = np.cumsum(rng.normal(scale=deviation, size=len(drop.time)))
-        background = Background(*cell_means(noise, rate, *quiet), variances, 1500.0)
-        under = np.interp(
-            np.arange(*drop.gate) / rate,
-            (contact[0] + contact[1]) / 2,
-            background.predict(contact),
-        )
-        left = noise[slice(*drop.gate)] - under
-        energies.append(10 ** (thud.force_exposure_levels(left, rate) / 10))
-    covariance = background.error_covariance(contact)
-    drop = replace(
-        drop, contact=replace(drop.contact, background=background, covariance=covariance)
-    )
-    edges = thud.get_bands()
-    mean, spread, quantized = band_noise([drop], edges)[0].T
-    assert not quantized.any()
-    # The mean of energies that scatter by up to as much as they are; four deviations.
-    scatter = np.std(energies, axis=0) / math.sqrt(count)
-    np.testing.assert_array_less(np.abs(np.mean(energies, axis=0) - mean)[:4], 4 * scatter[:4])
-    # The cells of the prediction, 0.2 ms, average what is above 500 Hz.
-    assert np.mean(energies, axis=0)[4] == pytest.approx(mean[4], rel=0.2)
-    assert (spread > 0).all()
 
 
 @pytest.mark.parametrize(
@@ -619,40 +554,6 @@ def test_probability_of_conformity_counts_both_limits() -> None:
     assert assess_levels([few, *NOMINAL[1:]]).criteria[0].probability == pytest.approx(expected)
     bound = replace(few, upper_bound=True)
     assert math.isnan(assess_levels([bound, *NOMINAL[1:]]).criteria[0].probability)
-
-
-@pytest.mark.parametrize(("scatter", "calibration"), [(0.5, 0.0), (0.5, 0.1), (0.3, 0.5)])
-@pytest.mark.slow
-def test_coverage_and_errors_of_the_verdict_by_monte_carlo(
-    scatter: float, calibration: float
-) -> None:
-    """JCGM 101: five drops with a shared error of calibration, on and far beyond the limits."""
-    rng = np.random.default_rng(4)
-    trials = 500
-    covered = 0
-    words: dict[float, list[str]] = {}
-    for true in (37.0, 38.0, 39.0, 40.0):
-        words[true] = []
-        for _ in range(trials):
-            drops = true + rng.normal(scale=scatter, size=5) + rng.normal(scale=calibration)
-            shared = [Contribution("calibration", calibration)]
-            quantity = Estimate.of_drops(float(np.mean(drops)), drops, np.zeros(5), shared)
-            covered += abs(quantity.value - true) <= quantity.expanded
-            words[true].append(_assess_level(quantity))
-    # Welch and Satterthwaite are exact for one contribution, and within a percent here for two.
-    lowest, highest = binom.ppf([1e-4, 1 - 1e-4], 4 * trials, [0.95 - 0.01, 0.95 + 0.015])
-    assert lowest <= covered <= highest
-    # On a limit, which conforms, each wrong and each right decision takes at most 2.5 %.
-    worst = binom.ppf(1 - 1e-4, trials, 0.025)
-    for limit in (38.0, 40.0):
-        assert words[limit].count("does not conform") <= worst
-        assert words[limit].count("conforms") <= worst
-    assert words[37.0].count("conforms") == 0
-    assert words[39.0].count("does not conform") == 0
-
-
-def _assess_level(quantity: Estimate) -> str:
-    return assess_levels([quantity, *NOMINAL[1:]]).criteria[0].conforms
 
 
 def test_energy_of_bands_adds_up_to_neighbours() -> None:
