@@ -8,6 +8,7 @@ import numpy as np
 
 from thud.base.checks import refuse
 from thud.base.files import replace_file
+from thud.base.tables import csv_text
 from thud.level.levels import finite_array
 
 if TYPE_CHECKING:
@@ -61,21 +62,15 @@ def write_floor_modes(  # noqa: PLR0913 - a mode, and a grid
     values = finite_array("shape", shape, range(4))
     if values.shape != (n_mode, *map(len, grid)):
         refuse(f"shape is an array {values.shape}", f"{(n_mode, *map(len, grid))}: modes, x and y")
-    rows = {
-        "frequency,Hz": frequencies,
-        "loss_factor,": _per_mode("loss_factor", loss_factor, n_mode),
-        "modal_mass,kg": _per_mode("modal_mass", modal_mass, n_mode),
-    }
     points = np.stack(np.meshgrid(*grid, indexing="ij"), axis=-1).reshape(-1, 2)
-    lines = [f"{title},{_joined(row)}" for title, row in rows.items()]
-    lines.append(f"x (m),y (m),{','.join(f'mode {i}' for i in range(1, n_mode + 1))}")
-    lines += map(_joined, np.hstack([points, values.reshape(n_mode, -1).T]))
-    replace_file(path, ("\n".join(lines) + "\n").encode())
-
-
-def _joined(row: Array) -> str:
-    """Return numbers with seven digits, separated by commas."""
-    return ",".join(f"{value:.7g}" for value in row)
+    rows = [
+        ["frequency", "Hz", *frequencies],
+        ["loss_factor", "", *_per_mode("loss_factor", loss_factor, n_mode)],
+        ["modal_mass", "kg", *_per_mode("modal_mass", modal_mass, n_mode)],
+        ["x (m)", "y (m)", *(f"mode {i}" for i in range(1, n_mode + 1))],
+        *np.hstack([points, values.reshape(n_mode, -1).T]),
+    ]
+    replace_file(path, csv_text(rows).encode())
 
 
 def _per_mode(name: str, values: ArrayLike, n_mode: int) -> Array:
