@@ -146,11 +146,7 @@ def new_floor_sound(
 ) -> FloorSound:
     """Return the sound of one floor; the arguments are those of `listen`."""
     n_modal = prediction.n_modal
-    modal = np.zeros(0)
-    if n_modal:
-        position, modal = _modal_pressure(prediction, position)
-    else:
-        position = None
+    place, modal = _modal_pressure(prediction, position) if n_modal else (None, np.zeros(0))
     square = _mean_square(prediction, len(modal) + MARGIN)
     modal = np.append(modal, np.zeros(square.shape[1] - len(modal)))
     target = np.vstack([_fast_histories(modal, range(n_modal)), _fast_history(square)])
@@ -159,7 +155,7 @@ def new_floor_sound(
     envelopes = np.sqrt(square)
     pressure, level = _realization(modal, envelopes, reference, seed)
     pressure = resample(pressure, RATIO * len(pressure))
-    return FloorSound(name, prediction, position, pressure, level, reference)
+    return FloorSound(name, prediction, place, pressure, level, reference)
 
 
 def _realization(
@@ -302,14 +298,10 @@ def _fast_history(square: Array) -> Array:
 
 def _a_weighting(frequency: Array) -> Array:
     """Return the factor of pressure of the A-weighting at frequencies, Hz (IEC 61672-1 annex E)."""
-
-    def response(frequency: Array) -> Array:
-        low, lower, upper, high = (
-            corner**2 + frequency**2 for corner in (20.6, 107.65, 737.86, 12194.22)
-        )
-        return np.asarray(frequency**4 / (low * np.sqrt(lower * upper) * high))
-
-    return np.asarray(response(frequency) / response(np.array(1000.0)))
+    f = np.append(frequency, 1000.0)
+    low, lower, upper, high = (corner**2 + f**2 for corner in (20.6, 107.65, 737.86, 12194.22))
+    response = f**4 / (low * np.sqrt(lower * upper) * high)
+    return np.asarray(response[:-1] / response[-1])
 
 
 @lru_cache

@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from thud.base.display import Columns
-    from thud.impact.impact import Impact
     from thud.recordings.recording import ImpactResult
 
 KINDS = {"floor": "force on the floor", "elastic": "elastic force"}
@@ -170,19 +169,14 @@ def blocked_force(source: ImpactResult, *, drop: int = 1) -> BlockedForce:
     if isinstance(source, Recording):
         return _of_recording(source, drop)
     require_whole("drop", drop, 1, 1)
-    return _of_impact(source)
-
-
-def _of_impact(impact: Impact) -> BlockedForce:
-    """Return the assessed force of a model."""
-    case = impact.case
+    case = source.case
     model = case.model.name if case.model else ""
     return BlockedForce(
         name=case.name,
-        force=impact.force(),
-        sample_rate=impact.sample_rate,
-        start=float(impact.time[0] - impact.touch_time),
-        kind=impact.assessed_force(),
+        force=source.force(),
+        sample_rate=source.sample_rate,
+        start=float(source.time[0] - source.touch_time),
+        kind=source.assessed_force(),
         origin=f"case {case.name}, model {model}, drop height {case.drop.height:g} m",
         checksum=hashlib.sha256(case_text(case)).hexdigest(),
     )
