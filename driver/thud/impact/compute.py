@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -52,7 +51,7 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     ----------
     ball, drop
         Ball and drop, by default the standard rubber ball from 1 m. `ball` may instead be a `Case`,
-        without any other argument but `verify`.
+        without any other argument.
     model
         ``"modal_ball"`` (the default), ``"finite_element"``, ``"hollow_sphere"`` (the analytical
         model of the paper), ``"measured_modes"``, ``"hunt_crossley"`` or ``"two_mass"``; or an
@@ -72,7 +71,7 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
         Room below the floor, for `Impact.room_level`.
     verify
         Compute again at a finer resolution, for the numbers ``"finer_..."`` of
-        `Impact.model_quantities`; also with a case.
+        `Impact.model_quantities`.
     **options
         Options of the model, such as ``momentum_flux="retarding"``; see `HollowSphere`,
         `ModalBall`, `FiniteElement`, `MeasuredModes`, `HuntCrossley` and `TwoMass`.
@@ -97,11 +96,10 @@ def solve(  # noqa: PLR0913 - the keywords are the keys of two namelist groups
     sampling = {"sample_rate": sample_rate, "duration": duration, "substeps": substeps}
     settings = {name: value for name, value in sampling.items() if value is not None}
     if isinstance(ball, Case):
-        if settings or options or any(value is not None for value in (drop, model, floor, room)):
+        others = drop, model, floor, room
+        if settings or options or verify or any(value is not None for value in others):
             refuse("solve() has other arguments in addition to a case", "solve(case)")
         case = ball
-        if verify:
-            case = replace(case, sampling=replace(case.sampling, verify=True))
     else:
         case = Case(
             ball=Ball() if ball is None else ball,

@@ -314,7 +314,6 @@ def _columns(
     parameters: Mapping[str, ArrayLike], case: Case
 ) -> tuple[dict[str, NDArray[Any]], NDArray[np.float64]]:
     """Return arrays of one length by key, and their numbers for the library, [n_sample, n_key]."""
-    assert case.model is not None  # noqa: S101 - `solve_many` has set it
     keys = [find_key(name, case)[0] for name in parameters]
     for key in keys:
         if key not in KEYS:
