@@ -205,7 +205,7 @@ def test_command_compares_cases(
     assert str(paths[0]) in errors_of("floor", paths[0], paths[0], "-o", output)
     bare = tmp_path / "bare.nml"
     bare.write_text("&ball /\n&drop /\n&model /\n", encoding="utf-8")
-    assert "bare" in errors_of("floor", bare, "-o", tmp_path / "none")
+    assert "bare: &floor" in errors_of("floor", bare, "-o", tmp_path / "none")
     assert not (tmp_path / "none").exists()
 
 
@@ -215,7 +215,7 @@ def test_command_compares_cases(
         ({}, naming("cases")),
         ({"a": 1}, naming("a", "Case", "RoomPrediction")),
         *(({"a": replace(CASES["thin"], **{missing: None})}, r"^a: ")
-          for missing in ("model", "floor", "room")),
+          for missing in ("model", "floor")),
         ({"short": replace(CASES["thin"], sampling=thud.Sampling(duration=0.01))},
          r"^short: &sampling: duration"),
     ],
@@ -295,8 +295,8 @@ def test_rating_of_a_source_that_does_not_conform_is_marked() -> None:
     assert rows["source"] == ("the source does not conform", "")
     assert rows["class (KS F 2863-2)"] == ("", class_text(conforming.korean_class))
     assert (rows["required, dB"][0], rows["verdict"][0]) == ("49", "undecided")
-    text = html.unescape(page.files()["floors.html"].decode()).replace("\N{NO-BREAK SPACE}", " ")
-    text = text.replace("\N{MINUS SIGN}", "-")
+    text = html.unescape(page.files()["floors.html"].decode())
+    text = text.replace("\N{NO-BREAK SPACE}", " ").replace("\N{MINUS SIGN}", "-")
     assert all(f"<li>{note.message}</li>" in text for note in page.notes)
 
 
@@ -308,10 +308,3 @@ def test_tyre_has_no_rating_of_the_ball() -> None:
     texts = [*titles, repr(prediction)]
     assert not [text for text in texts if re.search("ISO|KS F|L_iA|class", text)]
     assert "A-weighted level (thirds), dB" in titles
-
-
-def test_case_without_floor_names_no_model(errors_of: ErrorsOf, tmp_path: Path) -> None:
-    (tmp_path / "bare.nml").write_text("&ball /\n")
-    message = errors_of("floor", tmp_path / "bare.nml")
-    assert "no &floor and no &room; allowed: cases with &floor and &room" in message
-    assert "&model" not in message

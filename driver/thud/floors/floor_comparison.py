@@ -10,7 +10,7 @@ import numpy as np
 from tqdm import tqdm
 
 from thud.base._schema import RATED_BANDS, RATINGS
-from thud.base.checks import refuse, require_kind, require_mapping
+from thud.base.checks import require_kind, require_mapping
 from thud.base.display import Tabulated, column_rows
 from thud.base.errors import ThudError
 from thud.base.files import Results
@@ -66,7 +66,10 @@ class FloorComparison(Tabulated):
                 f"standard uncertainty of {key}, dB": ([r.uncertainty for r in rated], ".1f"),
             }
         octaves = np.transpose([prediction.octave_level for prediction in predictions])
-        tapping = [_tapping(prediction) for prediction in predictions]
+        tapping = [
+            tapping_level(p.floor, p.room) if has_tapping_level(p.floor, p.room) else None
+            for p in predictions
+        ]
         required = [p.room.required for p in predictions]
         return {
             "name": ([*self.predictions], ""),
@@ -87,8 +90,8 @@ class FloorComparison(Tabulated):
                 [1e3 * p.energy.sum() for p in predictions],
                 ".3g",
             ),
-            "tapping machine L_n,w, dB": ([level for level, _ in tapping], ".0f"),
-            "tapping machine C_I, dB": ([adaptation for _, adaptation in tapping], ".0f"),
+            "tapping machine L_n,w, dB": ([t.weighted if t else np.nan for t in tapping], ".0f"),
+            "tapping machine C_I, dB": ([t.adaptation if t else np.nan for t in tapping], ".0f"),
         }
 
     def rows(self) -> list[tuple[str, ...]]:
@@ -124,14 +127,15 @@ def compare_floors(
     Parameters
     ----------
     cases
-        By name: predictions, cases with floor and room, constructions or names of constructions.
+        By name: predictions, cases with a floor, constructions or names of constructions. A case
+        without a room has that of `predict_level`.
     progress
         Show a progress bar.
 
     Raises
     ------
     InputError
-        If there are no cases, or a case has no model, floor or room.
+        If there are no cases, or a case has no model or floor.
     """
     require_mapping("cases", cases, "cases or predictions")
     result: dict[str, RoomPrediction] = {}
@@ -141,27 +145,11 @@ def compare_floors(
             result[name] = entry
             continue
         case = entry if isinstance(entry, Case) else with_floor(Case(), entry)
-        missing = [group for group in ("model", "floor", "room") if getattr(case, group) is None]
-        if missing:
-            refuse(
-                f"{name}: the case has no {' and no '.join(f'&{group}' for group in missing)}",
-                "cases with &floor and &room"
-                + ", and with &model beside &modes" * ("model" in missing),
-            )
         try:
             result[name] = predict_level(compute(case))
         except ThudError as error:
             raise error.within(name) from error
     return FloorComparison(result)
-
-
-def _tapping(prediction: RoomPrediction) -> tuple[float, float]:
-    """Return weighted level and adaptation term of the tapping machine, dB; NaN if none apply."""
-    floor, room = prediction.floor, prediction.room
-    if not has_tapping_level(floor, room):
-        return np.nan, np.nan
-    level = tapping_level(floor, room)
-    return level.weighted, level.adaptation
 
 
 def _source(prediction: RoomPrediction) -> str:

@@ -14,7 +14,7 @@ from thud.base.bridge import ask
 from thud.base.checks import refuse, require_kind
 from thud.base.display import Tabulated
 from thud.base.note import Note
-from thud.case.case import Case, case_text
+from thud.case.case import Case, case_text, impact_only
 from thud.case.constructions import Construction, with_floor
 from thud.floors.description import rating_text, rating_title
 from thud.floors.survey import RoomLevels
@@ -203,12 +203,12 @@ def predict_level(
     case = with_floor(replace(case, room=room), case.floor if floor is None else floor)
     floor, room = case.floor, case.room
     if floor is None or room is None:
-        refuse("floor is missing", "a floor, such as Plate, or the name of a construction")
+        refuse("&floor is missing", "a floor, such as Plate, or the name of a construction")
     if source is None:
         source = compute(Case(floor=floor, room=room))
     case = source.case
-    floor_case = replace(case, modes=None, floor=floor, room=room)
-    impact, level = _on_floor(source, floor_case)
+    floor_case = replace(impact_only(case), floor=floor, room=room)
+    impact, level = _on_floor(source, floor_case, room)
     if (floor, room) == (case.floor, case.room):
         level = source.room_level or level
     if level is None:
@@ -217,7 +217,6 @@ def predict_level(
             "room_level", case=case_text(floor_case), force=force, sample_rate=source.sample_rate
         )
         level = new_room_level(answer)
-        assert level is not None  # noqa: S101 - the answer of this question has a room
     if impact:
         blocked = (
             source.blocked_force.max() if isinstance(source, FloorImpact) else source.peak_force
@@ -255,21 +254,20 @@ def _source_notes(source: ImpactResult) -> tuple[Note, ...]:
     return (Note("source_not_conforming", "room", others={"octaves": ", ".join(outside)}),)
 
 
-def _on_floor(source: ImpactResult, case: Case) -> tuple[FloorImpact | None, RoomLevel | None]:
+def _on_floor(
+    source: ImpactResult, case: Case, room: Room
+) -> tuple[FloorImpact | None, RoomLevel | None]:
     """Return the impact on the floor of a case; None if only the blocked force is known.
 
     Also return the level in its room if the impact is computed again.
     """
     existing = source if isinstance(source, FloorImpact) else source.on_floor
-    known, room = source.case, source.case.room or Room()
-    air = room.air_density, room.sound_speed
-    assert case.room is not None  # noqa: S101 - for the type checker
-    is_same = (known.floor, *air) == (case.floor, case.room.air_density, case.room.sound_speed)
-    if known.model is None or is_same:
+    known, air = source.case, source.case.room or Room()
+    state = case.floor, room.air_density, room.sound_speed
+    if known.model is None or state == (known.floor, air.air_density, air.sound_speed):
         return existing, None
-    plain = replace(case, compression=None)
     blocked = source.blocked_force if isinstance(source, FloorImpact) else source.force("floor")
-    answer = ask("floor_impact", case=case_text(plain))
+    answer = ask("floor_impact", case=case_text(case))
     return new_floor_impact(case, answer, blocked), new_room_level(answer)
 
 
