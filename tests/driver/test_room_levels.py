@@ -158,7 +158,7 @@ def test_mean_background_and_scatter_of_positions(tmp_path: Path) -> None:
             ("63,60\n125,60\n250,60", "500 Hz"), ("63,60\n63,60\n250,60\n500,6", "63 Hz"),
             ("63,60\n125,60\n250,60\n470,60", "470 Hz"), ("63,60\n125", "line 3", 1, 2),
             ("61,60\n125,60\n250,60\n500,60", "frequency", "61 Hz"),
-            ("0.99,60\n63,60\n125,60\n250,60\n500,60", "frequency", "0.99 Hz"),
+            ("0.9,60\n63,60\n125,60\n250,60\n500,60", "frequency", "0.9 Hz"),
             ("63,60\n125,60\n250,60\n500,60\n100000,60", "frequency", "100000 Hz"),
             ("63,60\n125,600\n250,60\n500,60", "level", "600 dB", -50, 200),
             ("63,60\n125,nan\n250,60\n500,60", "level", "nan", -50, 200),
@@ -280,9 +280,6 @@ def test_numbers_of_a_survey_are_those_of_its_definitions() -> None:
     assert GOOD.standardized_rating.rows() == thud.rating(GOOD.standardized).rows()
     two = replace(GOOD, positions=GOOD.positions[:2])
     assert two.spread == pytest.approx(abs(np.diff(two.positions, axis=0)[0]) / np.sqrt(2))
-    energy = [10 ** (thud.rating(one).a_weighted / 10) for one in two.positions]
-    error = abs(energy[0] - energy[1]) / 2 / np.mean(energy)
-    assert two.position_uncertainty == pytest.approx(10 / np.log(10) * error)
     one = replace(GOOD, positions=GOOD.positions[:1], background=None)
     assert (one.spread, one.position_uncertainty) == (None, None)
     assert one.level.tolist() == one.measured.tolist()
@@ -317,7 +314,6 @@ def test_rows_of_a_table_may_have_any_order_and_further_bands(tmp_path: Path) ->
         "f,P1\n61.2,60\n128,60\n250,60\n500,60",
         "f,P1\n64.8,60\n122,60\n250,60\n500,60",
         "f,P1\n1,60\n63,60\n125,60\n250,60\n500,60",
-        "f,P1\n63,60\n125,60\n250,60\n500,60\n99000,60",
         "f,P1\n63,200\n125,-50\n250,60\n500,60",
         "f,P1,T\n63,60,0.01\n125,60,0.01\n250,60,100\n500,60,20",
         "f,P1,background\n63,60,0.009\n125,60,0.01\n250,60,100\n500,60,20",

@@ -186,11 +186,6 @@ def _band_spectra(force: Array, sample_rate: float, bands: BandSet) -> list[NDAr
     """Return the spectrum of a force in each band, at the same number of frequency points."""
     edges = get_bands(bands)
     time = np.arange(len(force)) / sample_rate
-    used = np.flatnonzero(force)
-    end = used[-1] + 1 if len(used) else 1
-    result: list[NDArray[np.complex128]] = []
-    for low, high in zip(edges.lower, edges.upper, strict=True):
-        points = low + (np.arange(_POINTS_PER_BAND) + 0.5) * (high - low) / _POINTS_PER_BAND
-        waves: NDArray[np.complex128] = np.exp(-2j * np.pi * np.outer(points, time[:end]))
-        result.append(waves @ force[:end])
-    return result
+    fraction = (np.arange(_POINTS_PER_BAND) + 0.5) / _POINTS_PER_BAND
+    points = np.outer(edges.upper - edges.lower, fraction) + edges.lower[:, np.newaxis]
+    return [np.asarray(np.exp(-2j * np.pi * np.outer(f, time)) @ force, complex) for f in points]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import f90nml
 import numpy as np
@@ -158,8 +158,6 @@ def fit_mobility(measured: Mobility, *, order: int | None = None) -> MobilityFit
     if (values == 0).any():
         first = frequency[(values == 0).argmax()]
         refuse(f"{label}: the value at {first:g} Hz is 0", "values other than 0")
-    if len(frequency) <= 1:
-        refuse(f"{label}: {len(frequency)} frequencies above 0 Hz", "two or more")
     if not _covered(frequency):
         refuse(
             f"{label}: {len(frequency)} frequencies from {frequency.min():g} to "
@@ -220,12 +218,8 @@ def _best_fit(measured: Mobility) -> MobilityFit:
 
 def _fit(measured: Mobility, order: int) -> MobilityFit:
     """Return the fit with a number of poles."""
-    result: dict[str, Any] = ask(
+    result = ask(
         "mobility_fit", frequency=measured.frequency, real=measured.values.real,
         imaginary=measured.values.imag, order=order,
     )  # fmt: skip
-    lists: dict[str, Any] = {
-        key: value if isinstance(value, float) else tuple(map(float, value))
-        for key, value in result["floor"].items()
-    }
-    return MobilityFit(measured, MeasuredMobility(**lists), result["free_error"])
+    return MobilityFit(measured, MeasuredMobility(**result["floor"]), result["free_error"])

@@ -34,17 +34,15 @@ _ALLOWED = (
     "a table with the columns frequency, Hz, real and imaginary, or magnitude and phase, degrees; "
     "or a universal file with one frequency response, data set 58"
 )
-_TITLES = {
-    "frequency": "frequency", "f": "frequency", "freq": "frequency",
-    "real": "real", "re": "real", "imaginary": "imaginary", "imag": "imaginary", "im": "imaginary",
-    "magnitude": "magnitude", "mag": "magnitude", "abs": "magnitude", "phase": "phase",
-    "frequenz": "frequency", "realteil": "real", "imaginärteil": "imaginary", "betrag": "magnitude",
-    "주파수": "frequency", "실수부": "real", "실수": "real", "허수부": "imaginary",
-    "허수": "imaginary",
-    "크기": "magnitude", "진폭": "magnitude", "위상": "phase",
-    "周波数": "frequency", "実部": "real", "実数部": "real", "虚部": "imaginary",
-    "虚数部": "imaginary", "振幅": "magnitude", "絶対値": "magnitude", "位相": "phase",
-}  # fmt: skip
+# First words of titles in English, German, Korean and Japanese, in lower case.
+_WORDS = {
+    "frequency": "frequency f freq frequenz 주파수 周波数",
+    "real": "real re realteil 실수부 실수 実部 実数部",
+    "imaginary": "imaginary imag im imaginärteil 허수부 허수 虚部 虚数部",
+    "magnitude": "magnitude mag abs betrag 크기 진폭 振幅 絶対値",
+    "phase": "phase 위상 位相",
+}
+_TITLES = {word: kind for kind, words in _WORDS.items() for word in words.split()}
 # SI units of the values and of the response by quantity, and of further columns by kind.
 _UNITS = {"mobility": "m/(Ns)", "accelerance": "m/(Ns2)", "receptance": "m/N"}
 _RESPONSE_UNITS = {"mobility": "m/s", "accelerance": "m/s2", "receptance": "m"}

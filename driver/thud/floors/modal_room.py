@@ -1,9 +1,4 @@
-"""Levels in a modal room below a floor, for positions of ball and microphone.
-
-The floor moves in its modes, the air in a rectangular room with rigid walls in its own; the
-reaction of the air is included only as radiation in the loss factor of the floor. Edges whose
-support is not known are simply supported.
-"""
+"""Levels in a modal room below a floor, for positions of ball and microphone."""
 
 from __future__ import annotations
 
@@ -29,10 +24,6 @@ if TYPE_CHECKING:
 
 # Maximum number of positions of ball or microphone.
 MAX_POSITIONS = 1000
-# Attributes of a `ModalRoom` that are those of the answer of the library.
-_AS_ANSWERED = (
-    "frequency", "crossover", "mean", "spread", "floor_energy", "room_energy", "sample_rate",
-)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -119,6 +110,10 @@ def modal_room(
 ) -> ModalRoom:
     """Compute the modal levels of a prediction for pairs of positions, up to the crossover.
 
+    The floor moves in its modes, the air in a rectangular room with rigid walls in its own; the
+    reaction of the air is included only as radiation in the loss factor of the floor. Edges whose
+    support is not known are simply supported.
+
     Walls and ceilings of its room and a stated improvement by a covering are left out, in
     `ModalRoom.prediction`, too. The energy of floor modes decays at the rate omega eta, the energy
     of room modes at 6 ln 10/T.
@@ -172,13 +167,13 @@ def modal_room(
     return ModalRoom(
         prediction=prediction,
         size=size,
-        balls=answer["ball"].T,
-        microphones=answer["microphone"].T,
-        level=answer["level"].transpose(2, 1, 0),
-        pressure=answer["pressure"].transpose(2, 1, 0),
-        floor_modes=int(answer["floor_modes"]),
-        room_modes=int(answer["room_modes"]),
-        **{name: answer[name] for name in _AS_ANSWERED},
+        balls=answer.pop("ball").T,
+        microphones=answer.pop("microphone").T,
+        level=answer.pop("level").transpose(2, 1, 0),
+        pressure=answer.pop("pressure").transpose(2, 1, 0),
+        floor_modes=int(answer.pop("floor_modes")),
+        room_modes=int(answer.pop("room_modes")),
+        **answer,
     )
 
 

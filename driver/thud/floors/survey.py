@@ -33,8 +33,9 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-# Rounded mid frequencies in a decade (ISO 3, R10), and the relative tolerance of frequencies.
-R10 = np.array([1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0])
+# Rounded mid frequencies from 1 Hz (ISO 3, R10), and the relative tolerance of frequencies.
+R10 = 1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0
+NOMINAL = np.array([float(f"{10**decade * value:.3g}") for decade in range(5) for value in R10])
 FREQUENCY_TOLERANCE = 0.03
 # Minimum number of positions, and distance to the background, dB, below which a level is an upper
 # bound (ISO 16283-2).
@@ -253,7 +254,12 @@ def read_room_levels(path: str | os.PathLike[str], volume: float | None = None) 
     for kind, name in (("frequency", "frequency"), (levels, "levels")):
         if kind not in kinds:
             refuse(f"{path}: there is no column of {name}", ALLOWED)
-    frequency = np.array([_nominal(f, path) for f in columns.pop("frequency")[0]])
+    stated = columns.pop("frequency")[0]
+    frequency = NOMINAL[np.abs(NOMINAL - stated[:, np.newaxis]).argmin(axis=1)]
+    unlike = stated[~(np.abs(frequency - stated) < FREQUENCY_TOLERANCE * stated)]
+    if unlike.size:
+        allowed = "those of octave or one-third-octave bands, such as 50, 63, 80"
+        refuse(f"{path}: frequency = {unlike[0]:g} Hz is not a mid frequency", allowed)
     order = np.argsort(frequency)
     bands = _bands_of(frequency[order], path)
     for kind, values in columns.items():
@@ -294,19 +300,6 @@ def _kind(title: str) -> str:
     word = "".join(filter(str.isalnum, text))
     kind = TITLES.get(word, "")
     return kind or ("position" if TITLES.get(word.rstrip("0123456789")) == "position" else "")
-
-
-def _nominal(frequency: float, path: object) -> float:
-    """Return the nearest rounded mid frequency; raise InputError if none is near."""
-    if 1 <= frequency < 1e5:  # noqa: PLR2004 - bands of sound
-        decade, index = divmod(round(10 * math.log10(frequency)), 10)
-        nearest = float(f"{R10[index] * 10.0**decade:.3g}")
-        if abs(nearest / frequency - 1) < FREQUENCY_TOLERANCE:
-            return nearest
-    return refuse(
-        f"{path}: frequency = {frequency:g} Hz is not a mid frequency",
-        "those of octave or one-third-octave bands, such as 50, 63, 80",
-    )
 
 
 def _bands_of(frequency: Array, path: object) -> BandSet:
