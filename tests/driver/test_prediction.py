@@ -110,27 +110,11 @@ def test_floor_that_gives_way_raises_a_warning(shell: thud.Impact, thickness: fl
     record = recorded(shell, mass=2.5, height=1.0)
     found = thud.predict_level(record, board, thud.Room())
     assert "blocked_force" in codes(found.notes)
-    # Integrate M F'' + (M k/Z) F' + k F = 0 of the same mass and contact time.
     assert found.force == "blocked"
-    stiffness = 2.5 * (np.pi / record.contact_time) ** 2
-    step, force, slope, peak = 1e-6, 0.0, stiffness, 0.0
-    for _ in range(30000):
-        slope -= step * (stiffness * found.conductance[0] * slope + stiffness / 2.5 * force)
-        force += step * slope
-        peak = max(peak, force)
-    assert found.force_change == pytest.approx(
-        20 * np.log10(peak / np.sqrt(stiffness * 2.5)), abs=0.01
-    )
+    change = _force_change(2.5, record.contact_time, 1 / found.conductance[0])
+    assert found.force_change == pytest.approx(change)
     heavy = thud.predict_level(record, thud.Plate(thickness=0.3), thud.Room())
     assert "blocked_force" not in codes(heavy.notes)
-
-
-def test_recording_is_predicted_as_the_impact_that_it_records(shell: thud.Impact) -> None:
-    recording = recorded(shell, mass=2.5, height=1.0)
-    found = thud.predict_level(recording, thud.Plate(), thud.Room())
-    expected = thud.predict_level(shell, thud.Plate(), thud.Room())
-    # The noise of the record, and 0.01 dB by the floor.
-    assert found.level == pytest.approx(expected.level, abs=0.1)
 
 
 def test_room_hears_the_mean_of_the_drops_without_noise(shell: thud.Impact) -> None:
@@ -343,7 +327,7 @@ def test_single_numbers_are_those_of_the_levels(shell: thud.Impact) -> None:
     assert found.difference(measured) == pytest.approx(np.linspace(80, 40, 15)[3:] - found.level)
 
 
-@pytest.mark.parametrize("resistance", [300.0, 600.0, 1e4])
+@pytest.mark.parametrize("resistance", [100.0, 300.0, 600.0, 1e4])
 def test_force_on_a_resistance_is_that_of_a_linear_source(resistance: float) -> None:
     """M F'' + (k M/Z) F' + k F = 0 from F = 0: the maximum of its closed form, on both sides."""
     mass, contact = 2.5, 0.02
@@ -484,7 +468,7 @@ def test_source_of_a_room_that_names_none_conforms(run: Run, case_file: CaseFile
     done = run(case_file("&floor name = 'plate' /\n&room /\n"), "-o", "out")
     assert str(found.rating) in " ".join(done.stdout.split())
     assert "does not conform" not in done.stderr
-    with pytest.raises(thud.InputError, match=naming("floor is missing")):
+    with pytest.raises(thud.InputError, match=naming("&floor is missing")):
         thud.predict_level()
     for name in ("floor", "room"):
         with pytest.raises(TypeError, match=naming(name, "ndarray")):
