@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from conftest import naming
 from scipy.optimize import brentq
-from scipy.signal import lsim, lti
 from scipy.stats import binom, norm, t as student
 from synthetic import make_drop, with_force
 
@@ -33,8 +32,6 @@ from thud.recordings.recorded_levels import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from thud.base.note import Note
     from thud.recordings.measured_drop import Drop
 
@@ -42,11 +39,6 @@ if TYPE_CHECKING:
 HALF_SINE = [38.3125, 30.6046, 19.2578, 8.9323, -0.4390]
 NOMINAL = [39.0, 31.0, 23.0, 17.0, 12.5]
 NAMES = [f"drop {i + 1}" for i in range(20)]
-
-
-def half_sine(time: np.ndarray, contact: float = 0.02) -> np.ndarray:
-    inside = (time >= 0) & (time <= contact)
-    return np.where(inside, 1500 * np.sin(np.pi * time / contact), 0.0)
 
 
 def closed_form(rate: float) -> np.ndarray:
@@ -172,18 +164,6 @@ def uncertainty(average: AverageLevels) -> np.ndarray:
     return np.array([level.uncertainty for level in average.estimates])
 
 
-def test_drops_that_differ_are_marked_and_kept() -> None:
-    drops = [make_drop(1.0, seed=i) for i in range(6)]
-    assert outliers.check(drops, measure_levels(drops)) == ()
-    odd = make_drop(1.0, seed=6)
-    odd = replace(with_force(odd, 1.05 * odd.force), name="odd")
-    found = outliers.check([*drops, odd], measure_levels([*drops, odd]))
-    assert {note.subject for note in found} == {"odd"}
-    # Equal drops differ by rounding.
-    same = [make_drop() for _ in range(5)]
-    assert outliers.check(same, measure_levels(same)) == ()
-
-
 def grubbs(count: int, significance: float) -> float:
     """Return the largest score of normal values that chance explains (Grubbs 1969), two-sided."""
     t = student.isf(significance / (2 * count), count - 2)
@@ -262,16 +242,6 @@ def test_drops_that_differ_share_the_probability_among_three_quantities() -> Non
         assert marked([*drops, doubtful]) == ()
 
 
-@pytest.mark.parametrize("count", [3, 5, 9, 15])
-def test_rate_of_false_outliers(count: int) -> None:
-    rng = np.random.default_rng(count)
-    trials = 1000
-    marked = sum(bool(find_outliers(rng.normal(size=count), NAMES, "level")) for _ in range(trials))
-    # Rosner's values are approximate for two and three outliers of few drops: up to 7 %.
-    lowest, highest = binom.ppf([1e-3, 1 - 1e-3], trials, [0.05, 0.05 if count < 10 else 0.07])
-    assert lowest <= marked <= highest
-
-
 def test_two_outliers_do_not_hide_each_other_and_noise_marks_none() -> None:
     values = [*np.random.default_rng(1).normal(size=13), 30.0, 31.0]
     assert [note.subject for note in find_outliers(values, NAMES, "level")] == [
@@ -281,31 +251,6 @@ def test_two_outliers_do_not_hide_each_other_and_noise_marks_none() -> None:
     assert find_outliers(values, NAMES, "level", uncertainty=[20.0] * 15) == ()
     assert find_outliers([1.0, np.nan, 2.0], NAMES, "level") == ()
     assert find_outliers([np.nan] * 3, NAMES, "level") == ()
-
-
-def through_plate(
-    force: Callable[[np.ndarray], np.ndarray], rate: float, plate: Plate
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return time and the force that a plate measures, integrated at 64 times the rate."""
-    fine = np.arange(round(0.1 * rate * 64)) / (64 * rate) - 0.03
-    omega, quality = 2 * np.pi * plate.f0, plate.Q
-    system = lti([omega**2], [1, omega / quality, omega**2])
-    _, measured, _ = lsim(system, force(fine), fine - fine[0])
-    return fine[::64], np.asarray(measured)[::64]
-
-
-@pytest.mark.parametrize("rate", [25600.0, 96000.0])
-@pytest.mark.parametrize("plate", [Plate(1600, 30), Plate(1050, 5), Plate(2113, 95)])
-@pytest.mark.slow
-def test_resonance_of_the_plate_is_taken_out(rate: float, plate: Plate) -> None:
-    time, measured = through_plate(half_sine, rate, plate)
-    corrected = correct_force(measured, rate, Chain((plate,)))
-    before = np.abs(thud.force_exposure_levels(measured, rate) - HALF_SINE)
-    after = np.abs(thud.force_exposure_levels(corrected, rate) - HALF_SINE)
-    assert before.max() > 0.3
-    # Aliases of what the plate measures fall by 24 dB per octave above its resonance.
-    assert after.max() < 1e-3
-    assert np.abs(corrected - half_sine(time)).max() < 0.01 * 1500
 
 
 def test_response_of_a_plate_is_that_of_a_mass_on_a_spring() -> None:
