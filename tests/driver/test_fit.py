@@ -14,8 +14,8 @@ from scipy import stats
 import thud
 from thud.case.keys import with_values
 from thud.studies.fitting import force_target, search
-from thud.studies.fitting.inference import infer, worst_directions
-from thud.studies.fitting.ranges import Range, bound_parameters, get_ranges
+from thud.studies.fitting.estimate import infer, worst_directions
+from thud.studies.parameter import Range, fitted_parameter, get_ranges
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -110,7 +110,7 @@ def test_search_keeps_the_automatic_elements_of_its_start(monkeypatch: pytest.Mo
     def search_nothing(terms: list[search.Term], *_: object, **__: object) -> None:
         raise Searched([term.case.model for term in terms])
 
-    monkeypatch.setattr("thud.studies.fit.search", search_nothing)
+    monkeypatch.setattr("thud.studies.fit.Objective", search_nothing)
     start = {"youngs_modulus": 2.2e6, "height": 0.9}
     target = thud.solve(model=COARSE)
     for case in (thud.Case(model=thud.FiniteElement()), thud.Case(model=COARSE)):
@@ -232,10 +232,15 @@ def test_parameters_are_lost_by_size_and_by_error_of_the_derivatives() -> None:
         assert lost(np.column_stack([base[:, 0], base @ [1, angle]]), none) == expected
 
 
+def ranges_of(case: thud.Case, **given: object) -> list[Range]:
+    """Return the ranges of parameters, given as in a fit."""
+    return get_ranges(case, [fitted_parameter(name, entry, case) for name, entry in given.items()])
+
+
 def test_ranges_start_inside_and_spread_to_half_and_double() -> None:
     def range_of(**given: object) -> Range:
         case = thud.Case(drop=thud.Drop(2.0), model=thud.HollowSphere())
-        return get_ranges(case, bound_parameters(case, given))[0]  # type: ignore[arg-type]
+        return ranges_of(case, **given)[0]
 
     plain = range_of(height=None)
     assert (plain.start, plain.scale, plain.spread) == (2.0, 2.0, (1.0, 4.0))
@@ -246,14 +251,12 @@ def test_ranges_start_inside_and_spread_to_half_and_double() -> None:
     narrow = range_of(height=thud.Parameter(start=2.0, low=1.99, high=2.0))
     assert narrow.start == pytest.approx(2.0 - 0.01 / 4)
     # A start at 0 has no scale of its own: a tenth of the range is one.
-    given = {"poisson_ratio": thud.Parameter(start=0.0, low=-0.2, high=0.3)}
-    (zero,) = get_ranges(SHELL, bound_parameters(SHELL, given))
+    (zero,) = ranges_of(SHELL, poisson_ratio=thud.Parameter(start=0.0, low=-0.2, high=0.3))
     assert zero.scale == pytest.approx(0.05)
 
 
 def test_starts_are_the_given_one_and_a_latin_hypercube_over_the_spread() -> None:
-    given = {"height": thud.Parameter(2.0), "mass": thud.Parameter(2.5, 2.0, 4.0)}
-    ranges = get_ranges(SHELL, bound_parameters(SHELL, given))
+    ranges = ranges_of(SHELL, height=thud.Parameter(2.0), mass=thud.Parameter(2.5, 2.0, 4.0))
     first, *others = search.starts_of(ranges, 9, 0)
     assert first == pytest.approx([1.0, 1.0])
     # Of height from half to double, of mass inside its limits: one in each eighth.

@@ -15,7 +15,7 @@ from scipy import stats
 import thud
 from thud import cli
 from thud.studies.fit import read_fit_study, run_fit
-from thud.studies.fitting.residual_tests import UNLIKELY
+from thud.studies.fitting.comparison import UNLIKELY
 
 if TYPE_CHECKING:
     from pathlib import Path

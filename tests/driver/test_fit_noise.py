@@ -16,8 +16,9 @@ from scipy.linalg import toeplitz
 import thud
 from thud.base.note import Note
 from thud.recordings.background import Background, fit_noise, unit_covariances
-from thud.studies.fitting import residual_tests
-from thud.studies.fitting.record_noise import (
+from thud.studies.fitting import comparison
+from thud.studies.fitting.record import (
+    Noise,
     Quiet,
     cell_waves,
     find_pulse,
@@ -26,9 +27,8 @@ from thud.studies.fitting.record_noise import (
     fit_quiet,
     grid_covariance,
     log_likelihood,
-    new_noise,
+    on_grid,
     record_noise,
-    to_grid,
 )
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "validation"))
@@ -52,6 +52,11 @@ def pulls(fit: thud.Fit) -> NDArray[np.float64]:
     """Return the errors of a fit over its standard errors."""
     errors = [(fit.values[n] - TRUTH[n]) / fit.standard_errors[n] for n in TRUTH]
     return np.array(errors)
+
+
+def to_grid(samples: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """Return columns of samples on a grid of `count` points."""
+    return on_grid(np.fft.rfft(samples, norm="ortho", axis=0)[: count // 2 + 1])
 
 
 @pytest.mark.parametrize("kind", [0, 1, 2])
@@ -103,8 +108,9 @@ def test_background_is_the_expected_value_of_what_is_predicted() -> None:
     root, other = rng.normal(size=(12, 12)), rng.normal(size=(12, 3))
     predicted, rest = other @ other.T, root @ root.T
     difference = rng.normal(size=12)
+    whiten = np.linalg.inv(np.linalg.cholesky(rest + predicted))
     np.testing.assert_allclose(
-        new_noise(rest, predicted).background(difference),
+        Noise(whiten, predicted, 1.0).background(difference),
         predicted @ np.linalg.solve(rest + predicted, difference),
     )
 
@@ -200,22 +206,22 @@ def test_tones_are_found_between_those_of_the_mains_and_the_band_edge() -> None:
 def test_noise_fails_each_test_as_often_as_it_says(
     test: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(residual_tests, "UNLIKELY", 0.1)
+    monkeypatch.setattr(comparison, "UNLIKELY", 0.1)
     rng, warned, tries = np.random.default_rng(9), 0, 800
     inside = np.arange(40) >= 28
     for _ in range(tries):
         values = rng.normal(size=40)
         if test == "color":
-            notes = residual_tests.color_warning(rng.normal(size=101))
+            notes = comparison.color_warning(rng.normal(size=101))
         elif test == "contact":
             # Three parameters take three of the twelve during contact.
             basis, _ = np.linalg.qr(rng.normal(size=(12, 3)))
             values[inside] -= basis @ (basis.T @ values[inside])
-            notes = residual_tests.contact_warning(values, inside, 3, 2.0)
+            notes = comparison.contact_warning(values, inside, 3, 2.0)
         else:
             freedom = 25 if test == "size of quiet" else None
             scale = np.sqrt(rng.chisquare(25) / 25) if freedom else 1.0
-            notes = residual_tests.size_warning(values / scale, 40, freedom)
+            notes = comparison.size_warning(values / scale, 40, freedom)
         warned += bool(notes)
     low, high = stats.binom.ppf([1e-4, 1 - 1e-4], tries, [0.085, 0.115])
     assert low <= warned <= high
@@ -224,10 +230,10 @@ def test_noise_fails_each_test_as_often_as_it_says(
 def test_color_is_that_of_residuals_but_a_constant() -> None:
     white = np.random.default_rng(1).normal(size=251)
     slow = np.convolve(white, [1.0, 1.0], "same") / np.sqrt(2)
-    (note,) = residual_tests.color_warning(slow)
+    (note,) = comparison.color_warning(slow)
     assert (note.code, note.others["side"]) == ("residuals_colored", "low")
-    assert not residual_tests.color_warning(slow[:19])
-    assert not residual_tests.color_warning(white + 3)
+    assert not comparison.color_warning(slow[:19])
+    assert not comparison.color_warning(white + 3)
 
 
 def test_white_noise_stays_white_on_the_grid() -> None:

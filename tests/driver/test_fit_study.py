@@ -141,7 +141,7 @@ def test_results_are_replaced_as_a_whole_and_others_on_demand_only(
 def test_useless_directory_is_reported_before_the_search(
     place: str, tmp_path: Path, errors_of: ErrorsOf, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.delattr("thud.studies.fit.search")
+    monkeypatch.delattr("thud.studies.fit.find_best")
     (tmp_path / "found").mkdir()
     (tmp_path / "found/notes.txt").touch()
     assert place in errors_of("fit", "-q", "-o", place, "study.toml")

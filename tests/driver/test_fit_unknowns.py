@@ -15,9 +15,9 @@ import thud
 from thud.case.keys import with_values
 from thud.studies.fit import read_fit_study
 from thud.studies.fitting import force_target
-from thud.studies.fitting.alternatives import ORDERS, UNKNOWNS, alternatives
-from thud.studies.fitting.inference import posterior
-from thud.studies.fitting.residual_tests import misfit_ratio
+from thud.studies.fitting.comparison import misfit_ratio
+from thud.studies.fitting.estimate import posterior
+from thud.studies.fitting.search import ORDERS, UNKNOWNS, alternatives
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "validation"))
 from fit_assumptions import ASSUMED, BACKGROUND, RATE, START, TRUTH, record

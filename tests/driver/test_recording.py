@@ -10,7 +10,7 @@ from conftest import naming
 
 import thud
 from thud.recordings.formats import text as table
-from thud.studies.fitting.force_record import read_record, time_and_force
+from thud.studies.fitting.record import read_record, time_and_force
 
 if TYPE_CHECKING:
     from pathlib import Path

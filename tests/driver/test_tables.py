@@ -15,7 +15,7 @@ from recording_files import opened
 import thud
 from thud.base.units import UNITS, find_unit
 from thud.recordings.formats.text import read_table
-from thud.studies.fitting.force_record import time_and_force
+from thud.studies.fitting.record import time_and_force
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -24,7 +24,7 @@ from thud.floors.mobility_table import read_mobility
 from thud.floors.survey import rating_table, read_room_levels
 from thud.recordings.config import read_config
 from thud.recordings.formats.text import read_table
-from thud.studies.fitting.force_record import read_record, time_and_force
+from thud.studies.fitting.record import read_record, time_and_force
 
 if TYPE_CHECKING:
     import random

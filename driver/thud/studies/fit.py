@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from tqdm import tqdm
 
 from thud.base._schema import FiniteElement
 from thud.base.checks import refuse, refuse_value, require_kind
@@ -16,13 +18,19 @@ from thud.base.files import Results
 from thud.case.case import Case, check_case
 from thud.case.keys import with_values
 from thud.impact.compute import compute
-from thud.studies.fitting.alternatives import UNKNOWNS
-from thud.studies.fitting.evaluation import search
+from thud.studies.fitting.estimate import new_fit
 from thud.studies.fitting.fit_report import file_ends
 from thud.studies.fitting.force_target import ForceTarget
-from thud.studies.fitting.ranges import bound_parameters, fitted_parameter, get_ranges
 from thud.studies.fitting.read_target import Target, read_target
-from thud.studies.fitting.search import SearchOptions, Term
+from thud.studies.fitting.search import (
+    UNKNOWNS,
+    Objective,
+    SearchOptions,
+    Term,
+    find_best,
+    require_data,
+)
+from thud.studies.parameter import fitted_parameter, get_ranges, known_parameters
 from thud.studies.study import (
     fix_keys,
     named_files,
@@ -34,15 +42,14 @@ from thud.studies.study import (
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Iterable, Sequence, Set as AbstractSet
+    from collections.abc import Sequence, Set as AbstractSet
 
     from numpy.typing import ArrayLike
 
     from thud.impact.impact import Impact
     from thud.recordings.recording import Recording
     from thud.studies.fitting.fit_result import Fit
-    from thud.studies.fitting.ranges import Range
-    from thud.studies.parameter import Parameter
+    from thud.studies.parameter import Parameter, Range
 
 
 def fit(  # noqa: PLR0913 - options of a search
@@ -110,7 +117,14 @@ def fit(  # noqa: PLR0913 - options of a search
     require_kind("case", case, Case)
     options = SearchOptions(confidence, starts, seed, max_steps, unknowns)
     options.require()
-    bound = bound_parameters(case, parameters)
+    require_kind("parameters", parameters, Iterable)
+    if isinstance(parameters, str):
+        parameters = [parameters]
+    if not isinstance(parameters, Mapping):
+        parameters = dict.fromkeys(map(str, parameters))
+    if not parameters:
+        refuse("parameters is empty", ", ".join(known_parameters(case)))
+    bound = tuple(fitted_parameter(name, entry, case) for name, entry in parameters.items())
     if not isinstance(target, list):
         target = [target if isinstance(target, Target) else ForceTarget(target)]
     elif not target or not all(isinstance(entry, Target) for entry in target):
@@ -163,11 +177,16 @@ def _with_fixed(
 def _search(
     terms: list[Term], ranges: list[Range], options: SearchOptions, *, progress: bool
 ) -> Fit:
+    """Return the best fit of the parameters of cases to their targets."""
+    require_data(terms, len(ranges))
     for i, term in enumerate(terms):
         model = term.case.model
         if isinstance(model, FiniteElement) and not (model.radial_elements or model.polar_elements):
             terms[i] = term._replace(case=_with_mesh(term.case, ranges))
-    return search(terms, ranges, options, progress=progress)
+    with tqdm(unit="impact", disable=not progress, leave=False) as bar:
+        objective = Objective(terms, ranges, bar)
+        best = find_best(objective, options)
+        return new_fit(objective, best.x, options, converged=best.status > 0)
 
 
 def _with_mesh(case: Case, ranges: list[Range]) -> Case:

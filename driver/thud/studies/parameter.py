@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.special import ndtri
 
+from thud.base._schema import KEYS
 from thud.base.checks import (
     MAX_NUMBER,
     refuse,
@@ -19,11 +20,12 @@ from thud.base.checks import (
     require_number,
     require_whole,
     shown,
+    suggestion,
 )
 from thud.base.immutable import Plain
 from thud.base.key import Key
 from thud.base.units import power_of, scaled
-from thud.case.keys import Value, find_key
+from thud.case.keys import Value, find_key, limits, with_values
 from thud.impact.datasets import coordinate_name
 
 if TYPE_CHECKING:
@@ -44,6 +46,12 @@ ENTRIES_BY_FORM = {
     "std": ("mean", "std"),
 }
 FIT_ENTRIES = ("start", "low", "high")
+# A start at a limit is moved away from it by this fraction of itself.
+INSIDE = 0.01
+# Limits of the library that exceed the start by this factor are ignored.
+FAR = 10.0
+# Other starts lie within this factor of the first where no limits are given.
+SPREAD = 2.0
 # Kinds of keys whose values are numbers.
 NUMERIC_KINDS = ("real", "whole", "list")
 _SCALES = ("linear", "log")
@@ -103,8 +111,9 @@ class Parameter(Plain):
     @property
     def shown_unit(self) -> tuple[str, int]:
         """Unit for tables and figures, and the exponent of ten that converts it to `key.unit`."""
-        unit = self.unit or self.key.unit or "1"
-        return unit, power_of(unit, self.key.unit, self.name)
+        if not self.unit:
+            return self.key.unit or "1", 0
+        return self.unit, power_of(self.unit, self.key.unit, self.name)
 
     @property
     def size(self) -> int:
@@ -206,21 +215,104 @@ def _check_normal(label: str, key: Key, table: dict[str, Any], default_mean: Val
     table["mean"] = float(mean)
 
 
-def read_fitted(name: str, entry: object, case: Case) -> Parameter:
-    """Return a fitted parameter, given as its table, a `Parameter`, its start, or None."""
+@dataclass(frozen=True)
+class Range:
+    """Start and limits of a parameter of a fit, SI units.
+
+    The search divides it by `scale`: its start, or a tenth of the range if that is 0. Other starts
+    lie within `spread`.
+    """
+
+    name: str
+    unit: str
+    start: float
+    low: float
+    high: float
+    scale: float
+    spread: tuple[float, float]
+
+
+def known_parameters(case: Case) -> dict[str, tuple[Key, float]]:
+    """Return key and value of all parameters that can be fitted, by name.
+
+    Entries of lists are counted from 1, as in a namelist: ``"frequency(1)"``.
+    """
+    case = case.resolved()
+    model = case.model
+    if model is None:
+        refuse("&model is missing", "a case with a source model")
+    result: dict[str, tuple[Key, float]] = {}
+    for key in KEYS:
+        if key.group not in {"ball", "drop"} and key.owner != model.name:
+            continue
+        value = getattr(model if key.owner else getattr(case, key.group), key.name)
+        if key.kind == "real":
+            result[key.name] = key, value
+        elif key.kind == "list" and not key.whole:
+            result |= {f"{key.name}({i})": (key, v) for i, v in enumerate(value, start=1)}
+    return result
+
+
+def fitted_parameter(name: str, entry: object, case: Case) -> Parameter:
+    """Return a parameter of a fit; raise InputError if it cannot be fitted.
+
+    The entry is its table, a `Parameter`, its start, or None.
+    """
+    known = known_parameters(case)
+    if name not in known:
+        model = case.model.name if case.model else ""
+        refuse(
+            f"[parameters] {name} is not a parameter of {model} that can be fitted"
+            f"{suggestion(name, known)}",
+            ", ".join(known),
+        )
     if isinstance(entry, Parameter):
         entry = entry.table
-    elif entry is None:
-        entry = {}
     elif not isinstance(entry, Mapping):
-        entry = {"start": entry}
+        entry = {} if entry is None else {"start": entry}
     label, key, table, power = _read_table(name, entry, case, FIT_ENTRIES)
     numbers: dict[str, Any] = {}
     for word, value in table.items():
         if word != "unit" and value is not None:
             require_number(f"{label}: {word}", value)
-            numbers[word] = scaled(value, power)
+            numbers[word] = scaled(value, power) if power else float(value)
     return Parameter(**numbers, unit=table.get("unit"), name=name, key=key)
+
+
+def get_ranges(case: Case, parameters: Sequence[Parameter]) -> list[Range]:
+    """Return ranges of parameters; raise InputError if a start is outside its limits."""
+    # Limits that are other keys take their values at the start.
+    begin = with_values(case, {p.name: p.start for p in parameters if p.start is not None})
+    starts = known_parameters(begin)
+    result = []
+    for parameter in parameters:
+        name, key = parameter.name, parameter.key
+        start, (lower, upper) = float(starts[name][1]), limits(key, begin)
+        scale = abs(start) or ((parameter.high or upper) - (parameter.low or lower)) / 10
+        low = lower if parameter.low is None else parameter.low
+        high = upper if parameter.high is None else parameter.high
+        if not lower <= low < high <= upper:
+            refuse(
+                f"[parameters] {name}: low = {low:g} and high = {high:g} are not allowed",
+                f"{lower:g} <= low < high <= {upper:g} {key.unit}".rstrip(),
+            )
+        if not low <= start <= high:
+            refuse(
+                f"[parameters] {name}: start = {start:g} is not allowed",
+                f"{low:g} <= start <= {high:g} {key.unit}".rstrip(),
+            )
+        spread = (
+            max(low, start - scale / SPREAD) if parameter.low is None else low,
+            min(high, start + scale * (SPREAD - 1)) if parameter.high is None else high,
+        )
+        if parameter.high is None and high > FAR * scale:
+            high = np.inf
+        if parameter.low is None and low < -FAR * scale:
+            low = -np.inf
+        margin = min(INSIDE * scale, (high - low) / 4)
+        start = min(max(start, low + margin), high - margin)
+        result.append(Range(name, key.unit, start, low, high, scale, spread))
+    return result
 
 
 def _read_table(
@@ -235,16 +327,15 @@ def _read_table(
         refuse(f"{label} = {shown(table)} is not a table", f"{', '.join(allowed)}, unit")
     refuse_unknown(label, table, (*allowed, "unit"))
     unit = table.get("unit")
-    if unit is None:
-        unit = key.unit or "1"
-    return label, key, table, power_of(unit, key.unit, label)
+    return label, key, table, 0 if unit is None else power_of(unit, key.unit, label)
 
 
 def read_value(label: str, key: Key, value: object, power: int) -> Value:
     """Return a value in the unit of its key; raise InputError if it is of another kind."""
     number = math.nan
     if isinstance(value, int | float) and not isinstance(value, bool):
-        number = scaled(value, power) if -MAX_NUMBER < value < MAX_NUMBER else math.inf
+        number = float(value) if -MAX_NUMBER < value < MAX_NUMBER else math.inf
+        number = scaled(number, power) if power else number
     valid, allowed, result = {
         "choice": (value in key.choices, ", ".join(map(repr, key.choices)), value),
         "flag": (isinstance(value, bool), "true, false", value),

@@ -1,25 +1,35 @@
-"""Targets of fits as functions: weighted residuals of a computed result, and checks of targets."""
+"""Targets of fits as functions: weighted residuals of a computed result, and tests of them."""
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, NamedTuple, TypeVar
 
 import numpy as np
+from scipy import stats
 
-from thud.base.checks import refuse_value, require_number
+from thud.base.checks import refuse_unknown, refuse_value, require_number
 from thud.base.immutable import Immutable
-from thud.studies.fitting.residual_tests import size_warning
+from thud.base.note import Note
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Collection, Mapping, Sequence
 
-    from thud.base.note import Note
+    from numpy.typing import NDArray
+
     from thud.case.case import Case
     from thud.studies.arrays import Array
 
 
+# Probability of a false warning by one test of residuals.
+UNLIKELY = 1e-3
+# Fewer residuals have no test of their color, and parts of them no test of their size.
+MIN_TESTED = 20
+MIN_FREEDOM = 5
+# Number of bands of frequency in which the size of residuals is determined.
+N_BAND = 4
 # What a model computes.
 Result = TypeVar("Result")
 # Relative step of the central differences. Forces are smooth to 1e-13, but have kinks where an
@@ -164,3 +174,86 @@ def require_positive(name: str, value: Any, unit: str) -> None:  # noqa: ANN401 
     require_number(f"target: {name}", value)
     if not value > 0:
         refuse_value(f"target: {name}", value, f"numbers above 0, {unit}")
+
+
+def require_unknowns(unknowns: object, known: Collection[str]) -> None:
+    """Raise InputError where unknowns are not a list of known names."""
+    if not isinstance(unknowns, list | tuple):
+        refuse_value("unknowns", unknowns, f"a list of {', '.join(known)}")
+    refuse_unknown("unknowns", unknowns, known)
+
+
+def misfit_ratio(residual: Array) -> float:
+    """Return the root mean square of residuals of unit variance; at least 1.
+
+    Of four bands of frequency that with the largest residuals counts: a model is wrong in one.
+    """
+    power = np.abs(np.fft.rfft(residual)[1:]) ** 2 / len(residual)
+    bands = [band.mean() for band in np.array_split(power, N_BAND) if len(band)]
+    return float(np.sqrt(max(1.0, np.mean(residual**2), *bands)))
+
+
+def size_warning(residual: Array, freedom: float, noise_freedom: int | None) -> list[Note]:
+    """Return a warning if residuals of known variance are too large (chi-square, or Fisher's F).
+
+    `noise_freedom` are the degrees of freedom of the data that determine the noise; None: it is
+    stated.
+    """
+    square = float(residual @ residual)
+    tail = (
+        stats.chi2.sf(square, freedom)
+        if noise_freedom is None
+        else stats.f.sf(square / freedom, freedom, noise_freedom)
+    )
+    return [] if tail > UNLIKELY else [Note("unexplained", value=math.sqrt(square / freedom))]
+
+
+def color_warning(residual: Array) -> list[Note]:
+    """Return a warning if residuals at uniform positions are not independent noise.
+
+    The cumulative periodogram (Bartlett) is uniform for white noise.
+    """
+    if len(residual) < MIN_TESTED:
+        return []
+    power = np.abs(np.fft.rfft(residual)[1:]) ** 2
+    share = np.cumsum(power) / power.sum()
+    result = stats.kstest(share[:-1], "uniform")
+    if result.pvalue > UNLIKELY:
+        return []
+    fraction = float(np.searchsorted(share, 0.5) / len(power))
+    side = "low" if fraction < 0.5 else "high"  # noqa: PLR2004 - halves
+    value = min(fraction, 1 - fraction)
+    return [Note("residuals_colored", value=value, others={"side": side})]
+
+
+def contact_warning(
+    residual: Array, inside: NDArray[np.bool_], count: int, unit: float
+) -> list[Note]:
+    """Return a warning if residuals during contact exceed those before and after it (F).
+
+    `count` parameters are fitted; `unit` is the unit of the residuals, N.
+    """
+    inside_count, outside_count = int(inside.sum()) - count, int((~inside).sum())
+    if min(inside_count, outside_count) < MIN_FREEDOM:
+        return []
+    square = float((residual[inside] ** 2).sum()) / inside_count
+    outside = float((residual[~inside] ** 2).sum()) / outside_count
+    if square < stats.f.isf(UNLIKELY, inside_count, outside_count) * outside:
+        return []
+    value, high = (unit * math.sqrt(part) for part in (square, outside))
+    return [Note("residuals_in_contact", value=value, high=high, unit="N")]
+
+
+def coverage_factor(confidence: float, freedom: int | None) -> float:
+    """Return the half width of a two-sided interval in standard errors.
+
+    It is Student's t, or normal where the noise is known (`freedom` is None).
+    """
+    quantile = (1 + confidence) / 2
+    return float(stats.norm.ppf(quantile) if freedom is None else stats.t.ppf(quantile, freedom))
+
+
+def require_confidence(confidence: object) -> None:
+    """Raise InputError where a confidence is not between 0 and 1."""
+    if not (isinstance(confidence, float | np.floating) and 0 < confidence < 1):
+        refuse_value("confidence", confidence, "0 < confidence < 1")

@@ -13,10 +13,14 @@ from thud.base.checks import refuse, refuse_value, require_array, require_number
 from thud.base.immutable import Plain
 from thud.case.case import new_model
 from thud.impact.compression import CompressionCurve, compress
-from thud.studies.fitting.alternatives import PRESS_UNKNOWNS, require_unknowns
-from thud.studies.fitting.comparison import Comparison, Own
+from thud.studies.fitting.comparison import (
+    Comparison,
+    Own,
+    color_warning,
+    misfit_ratio,
+    require_unknowns,
+)
 from thud.studies.fitting.force_target import GAIN, OWN
-from thud.studies.fitting.residual_tests import color_warning, misfit_ratio
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -44,6 +48,14 @@ _NUMERICAL = 1e-5
 _MAX_CORRELATION = 0.95
 _SAME = 0.02
 TOUCH = "touch"
+# Standard deviations of the unknowns of a press and of rubber in it: of offset, drift over the
+# curve and friction over the maximum force, of the relative softening at the last point.
+PRESS_UNKNOWNS: Mapping[str, float] = {
+    "offset": 0.01,
+    "drift": 0.01,
+    "friction": 0.005,
+    "softening": 0.05,
+}
 
 
 @dataclass(frozen=True, eq=False)

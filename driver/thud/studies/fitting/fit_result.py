@@ -13,8 +13,8 @@ from thud.base.extras import data_frame, require_extra
 from thud.base.files import Results
 from thud.base.immutable import Immutable
 from thud.base.units import display_unit
+from thud.studies.fitting.comparison import coverage_factor, require_confidence
 from thud.studies.fitting.fit_report import fit_files, fit_table, parameter_rows
-from thud.studies.fitting.inference import coverage_factor, require_confidence
 
 if TYPE_CHECKING:
     import os

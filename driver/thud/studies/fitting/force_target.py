@@ -18,22 +18,26 @@ from thud.recordings.background import OFFSET
 from thud.recordings.drops import MAX_BACKGROUND
 from thud.recordings.formats import MIN_SAMPLES
 from thud.recordings.recording import Recording
-from thud.studies.fitting.comparison import Comparison, Own, require_positive
-from thud.studies.fitting.force_record import Record, read_record
-from thud.studies.fitting.record_noise import (
+from thud.studies.fitting.comparison import (
+    MIN_FREEDOM,
+    Comparison,
+    Own,
+    color_warning,
+    contact_warning,
+    misfit_ratio,
+    require_positive,
+)
+from thud.studies.fitting.record import (
     MIN_BACKGROUND,
     Noise,
+    Record,
     find_pulse,
     find_quiet,
     find_tones,
     fit_quiet,
+    on_grid,
+    read_record,
     record_noise,
-)
-from thud.studies.fitting.residual_tests import (
-    MIN_FREEDOM,
-    color_warning,
-    contact_warning,
-    misfit_ratio,
 )
 
 if TYPE_CHECKING:
@@ -108,62 +112,15 @@ class ForceTarget(Immutable):
 
     def compare(self) -> ForceComparison:
         """Return the comparison of an impact with the record."""
-        self._require_options()
-        record = self._samples()
-        if self.window is not None:
-            record = _cut(record, self.window)
-        first, stop = self._pulse(record)
-        if self.window is None and not isinstance(self.record, Impact | Recording):
-            room = int(MAX_BACKGROUND * record.sample_rate)
-            start = max(first - room, 0)
-            time, force = (values[start : stop + room] for values in record[:2])
-            record = Record(time, force, record.sample_rate)
-            first, stop = first - start, stop - start
-        _require_record(record, self.below)
-        return self._compare(record, (first, stop))
-
-    def _require_options(self) -> None:
         if self.force is not None:
             require_choice("target: force", self.force, FORCES)
         if self.noise is not None:
             require_positive("noise", self.noise, "N")
         require_positive("below", self.below, "Hz")
-        count = len(self.record.drops) if isinstance(self.record, Recording) else 1
-        require_whole("target: drop", self.drop, 1, count)
         if self.gain is not None and self.gain != np.inf:
             require_positive("gain", self.gain, "relative standard uncertainty, or infinite")
-
-    def _pulse(self, record: Record) -> tuple[int, int]:
-        """Return the first sample of the pulse, and the stop (exclusive)."""
-        time, force, rate = record
-        if isinstance(self.record, Impact):
-            return 0, len(force)
-        if not isinstance(self.record, Recording):
-            return find_pulse(force, rate)
-        drop = self.record.drops[self.drop - 1]
-        first, stop = np.searchsorted(time, drop.time[[drop.gate[0], drop.gate[1] - 1]])
-        return int(first), min(int(stop) + 1, len(force))
-
-    def _samples(self) -> Record:
-        record = self.record
-        if isinstance(record, Recording):
-            drop = record.drops[self.drop - 1]
-            # Hum and offset that were removed are added: the fit estimates them itself.
-            return Record(drop.time, drop.force + drop.contact.removed, drop.sample_rate)
-        if isinstance(record, Impact):
-            return Record(record.time, record.force(self.force), record.sample_rate)
-        try:
-            table = np.column_stack([np.asarray(column, dtype=np.float64) for column in record])
-        except (TypeError, ValueError) as error:
-            refuse(
-                "target cannot be used",
-                "a ForceTarget, LevelTarget, Recording or Impact, or two arrays of one length: "
-                "time, s, and force, N",
-                error,
-            )
-        return read_record(table, "target")
-
-    def _compare(self, record: Record, pulse: tuple[int, int]) -> ForceComparison:
+        record, pulse = self._record()
+        _require_record(record, self.below)
         (time, force, rate), exact = record, isinstance(self.record, Impact)
         count = int(self.below * (len(time) / rate) * (1 + ROUNDING)) + 1
         spectrum = np.fft.rfft(force, norm="ortho")[:count]
@@ -195,6 +152,43 @@ class ForceTarget(Immutable):
             noise=noise, background=background,
             short=np.nan if known or exact or self.noise else quiet.seconds,
         )  # fmt: skip
+
+    def _record(self) -> tuple[Record, tuple[int, int]]:
+        """Return the compared part of the record, and its pulse: first sample, and stop."""
+        source = self.record
+        count = len(source.drops) if isinstance(source, Recording) else 1
+        require_whole("target: drop", self.drop, 1, count)
+        if isinstance(source, Recording):
+            drop = source.drops[self.drop - 1]
+            # Hum and offset that were removed are added: the fit estimates them itself.
+            record = Record(drop.time, drop.force + drop.contact.removed, drop.sample_rate)
+        elif isinstance(source, Impact):
+            record = Record(source.time, source.force(self.force), source.sample_rate)
+        else:
+            try:
+                table = np.column_stack([np.asarray(column, dtype=np.float64) for column in source])
+            except (TypeError, ValueError) as error:
+                refuse(
+                    "target cannot be used",
+                    "a ForceTarget, LevelTarget, Recording or Impact, or two arrays of one length: "
+                    "time, s, and force, N",
+                    error,
+                )
+            record = read_record(table, "target")
+        time, force, rate = record if self.window is None else _cut(record, self.window)
+        if isinstance(source, Recording):
+            gate = np.searchsorted(time, drop.time[[drop.gate[0], drop.gate[1] - 1]])
+            first, stop = int(gate[0]), min(int(gate[1]) + 1, len(force))
+        elif isinstance(source, Impact):
+            first, stop = 0, len(force)
+        else:
+            first, stop = find_pulse(force, rate)
+            if self.window is None:
+                room = int(MAX_BACKGROUND * rate)
+                begin = max(first - room, 0)
+                time, force = time[begin : stop + room], force[begin : stop + room]
+                first, stop = first - begin, stop - begin
+        return Record(time, force, rate), (first, stop)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -234,11 +228,6 @@ class ForceComparison(Comparison["Impact"]):
         """Fraction of the deviation of white noise that lies in the compared band."""
         return float(np.sqrt(len(self.weighted_target) / len(self.record.time)))
 
-    @property
-    def _period(self) -> float:
-        """Length of the record, s."""
-        return len(self.record.time) / self.record.sample_rate
-
     def solve(self, case: Case) -> Impact:
         """Return the impact of a case."""
         return compute(case)
@@ -250,8 +239,9 @@ class ForceComparison(Comparison["Impact"]):
     def spectrum_of(self, impact: Impact, own: Array) -> NDArray[np.complex128]:
         """Return the Fourier coefficients of the force of an impact at the times of the record."""
         time, _, rate = self.record
-        count, period = len(self.spectrum), self._period
-        force, own_rate = impact.force(self.kind), impact.sample_rate
+        count, period = len(self.spectrum), len(time) / rate
+        force = impact.elastic_force if self.kind == "elastic" else impact.floor_force
+        own_rate = impact.sample_rate
         turned = zoom_fft(force, [0.0, count / period], count, fs=own_rate).astype(np.complex128)
         turned *= rate / own_rate / np.sqrt(len(time))
         shift = self.own_value(SHIFT, own)
@@ -268,16 +258,14 @@ class ForceComparison(Comparison["Impact"]):
             count = 16 * len(product)
             lag = np.argmax(np.fft.irfft(product, count)) / count
             # A pulse that begins shortly before the record does not begin at its end.
-            own[0] += (lag - (lag > 3 / 4)) * self._period
+            period = len(self.record.time) / self.record.sample_rate
+            own[0] += (lag - (lag > 3 / 4)) * period
         return own
-
-    def _difference(self, impact: Impact, own: Array) -> Array:
-        """Return record − model on the grid, N."""
-        return on_grid(self.spectrum - self.spectrum_of(impact, own))
 
     def misfit(self, result: Impact, own: Array) -> Array:
         """Return model minus target over standard deviation, shape (n,)."""
-        weighted: Array = self.noise.whiten @ -self._difference(result, own)
+        difference = on_grid(self.spectrum - self.spectrum_of(result, own))
+        weighted: Array = self.noise.whiten @ -difference
         return weighted
 
     def columns(self, result: Impact, own: Array) -> dict[str, Array]:
@@ -299,7 +287,7 @@ class ForceComparison(Comparison["Impact"]):
 
     def is_exact(self, result: Impact, own: Array) -> bool:
         """Return whether residuals are too small to be tested: numerical errors."""
-        difference = self._difference(result, own)
+        difference = on_grid(self.spectrum - self.spectrum_of(result, own))
         unexplained = difference - self.noise.background(difference)
         return bool(np.sqrt(np.mean(unexplained**2)) < NUMERICAL * self.record.force.max())
 
@@ -328,17 +316,11 @@ class ForceComparison(Comparison["Impact"]):
 
     def _inside(self, impact: Impact, own: Array) -> NDArray[np.bool_]:
         """Return which residuals lie in the contact."""
-        count = len(self.weighted_target)
-        time = self.record.time[0] + np.arange(count) * self._period / count
+        count, period = len(self.weighted_target), len(self.record.time) / self.record.sample_rate
+        time = self.record.time[0] + np.arange(count) * period / count
         begin = self.own_value(SHIFT, own)
         inside: NDArray[np.bool_] = (time >= begin) & (time <= begin + impact.contact_time)
         return inside
-
-
-def on_grid(spectrum: NDArray[np.complex128]) -> Array:
-    """Return the history of Fourier coefficients on the grid of the residuals."""
-    result: Array = np.fft.irfft(spectrum, 2 * len(spectrum) - 1, norm="ortho")
-    return result
 
 
 def _cut(record: Record, window: tuple[float, float]) -> Record:

@@ -12,9 +12,9 @@ from thud.recordings.formats import FORMATS
 from thud.recordings.formats.text import read_table
 from thud.recordings.recording import read_recording
 from thud.studies.fitting.compression_target import CompressionTarget
-from thud.studies.fitting.force_record import read_record, time_and_force
 from thud.studies.fitting.force_target import ForceTarget
 from thud.studies.fitting.level_target import LevelTarget
+from thud.studies.fitting.record import read_record, time_and_force
 from thud.studies.parameter import read_quantity
 
 if TYPE_CHECKING:

@@ -3,34 +3,66 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
 
+from thud.base._schema import FiniteElement, InfinitePlate, ModalBall
 from thud.base.checks import MAX_SEED, refuse, require_whole
 from thud.base.errors import NumericalError, ThudError
 from thud.base.note import Note
 from thud.case.keys import with_values
-from thud.studies.fitting.alternatives import UNKNOWNS, alternatives, require_unknowns
-from thud.studies.fitting.inference import require_confidence
+from thud.studies.fitting.comparison import require_confidence, require_unknowns
 from thud.studies.sampling import unit_samples
+from thud.studies.unknowns import ORDER_RANGE
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Sequence
+    from collections.abc import Callable, Collection, Iterator, Sequence
 
     from tqdm import tqdm
 
     from thud.case.case import Case
     from thud.studies.arrays import Array
     from thud.studies.fitting.comparison import Comparison, Own
-    from thud.studies.fitting.ranges import Range
+    from thud.studies.parameter import Range
 
 
+# Orders of the damping laws of rubber, and one between them.
+ORDERS = (ORDER_RANGE[0], sum(ORDER_RANGE) / 2, ORDER_RANGE[1])
+_FRACTIONAL = [{"fractional_order": order} for order in ORDERS]
+# Driving-point resistance of a slab, N s/m: concrete of 75 mm. A force plate stands on more.
+RESISTANCE = 1e5
+
+
+_OTHER_FRICTION = {"none": "stick", "stick": "none"}
+# Laws of viscosity that may be another one: prony states its relaxation times.
+_LAWS = ("kelvin_voigt", "fractional", "constant_loss")
+# Values of keys that a case may have instead of its own, by model and unknown. Shell and lumped
+# models have none: they are farther from a force than these alternatives are from each other.
+_ALTERNATIVES: dict[type, dict[str, Callable[[Any], list[dict[str, object]]]]] = {
+    ModalBall: {
+        "damping law": lambda _: [{"damping_law": "fractional", **e} for e in _FRACTIONAL],
+        "friction": lambda m: [{"floor_friction": _OTHER_FRICTION[m.floor_friction]}],
+        "gravity": lambda m: [{"contact_gravity": not m.contact_gravity}],
+        "floor": lambda _: [{"resistance": RESISTANCE}],
+    },
+    FiniteElement: {
+        "damping law": lambda m: [
+            {"viscosity": "fractional", **e} for e in _FRACTIONAL if m.viscosity in _LAWS
+        ],
+        "friction": lambda m: [{"friction": 0.0 if m.friction else 1.0}],
+        "floor": lambda _: [{"resistance": RESISTANCE}],
+    },
+}
+UNKNOWNS = tuple(_ALTERNATIVES[ModalBall])
+# Keys that, if they are fitted, take the place of an unknown.
+_FITTED = {"fractional_order": "damping law", "friction": "friction"}
 # Relative steps and gains at which the search ends.
 TOLERANCE = 1e-8
-
-
+# Maximum number of searches with the noise of the residuals of the one before.
+MAX_SEARCHES = 8
 # Maximum number of starts, and of steps of a search.
 _MAXIMUM = 100_000
 
@@ -93,6 +125,25 @@ class Effects(NamedTuple):
     failures: tuple[Note, ...]
 
 
+def alternatives(
+    case: Case, unknowns: Collection[str], fitted: Collection[str]
+) -> list[tuple[str, str, Case]]:
+    """Return unknown, label and case of each alternative to a case, if some keys are fitted."""
+    known = {_FITTED[name] for name in fitted if name in _FITTED}
+    rigid = replace(case, floor=None, room=None)
+    on_plate = replace(rigid, floor=InfinitePlate())
+    return [
+        (
+            name,
+            " and ".join(f"{key} {value!r}" for key, value in values.items()),
+            with_values(on_plate if name == "floor" else rigid, values),
+        )
+        for name, values_of in _ALTERNATIVES.get(type(case.model), {}).items()
+        if name in unknowns and name not in known
+        for values in values_of(case.model)
+    ]
+
+
 class Objective:
     """Residuals of all targets and their derivatives; parameters are divided by their scales."""
 
@@ -153,27 +204,23 @@ class Objective:
         jacobian = np.zeros((self.size, len(x)))
         # Own parameters first: they need no other results.
         for i in reversed(range(len(x))):
-            jacobian[:, i] = self._column(x, i, step, here)
+            ends = []
+            for position in (min(x[i] + step, self.high[i]), max(x[i] - step, self.low[i])):
+                beside = x.copy()
+                beside[i] = position
+                value = self.residual(beside)
+                # The derivative is one-sided if the other side fails.
+                possible = np.isfinite(value).all()
+                ends.append((position, value) if possible else (x[i], here))
+            (above, high), (below, low) = ends
+            if above == below:
+                message = (
+                    f"{self.ranges[i].name}: the model cannot be computed around "
+                    f"{x[i] * self.scale[i]:g} ({self.error})"
+                )
+                raise NumericalError(message)
+            jacobian[:, i] = (high - low) / (above - below)
         return jacobian
-
-    def _column(self, x: Array, i: int, step: float, here: Array) -> Array:
-        """Return the derivative by one parameter; one-sided if the other side fails."""
-        ends = []
-        for position in (min(x[i] + step, self.high[i]), max(x[i] - step, self.low[i])):
-            beside = x.copy()
-            beside[i] = position
-            value = self.residual(beside)
-            possible = np.isfinite(value).all()
-            ends.append((position, value) if possible else (x[i], here))
-        (above, high), (below, low) = ends
-        if above == below:
-            message = (
-                f"{self.ranges[i].name}: the model cannot be computed around "
-                f"{x[i] * self.scale[i]:g} ({self.error})"
-            )
-            raise NumericalError(message)
-        column: Array = (high - low) / (above - below)
-        return column
 
     def effects(self, x: Array, unknowns: Collection[str]) -> Effects:
         """Return the changes of the residuals of forces by the alternatives to a case."""
@@ -226,13 +273,14 @@ def require_data(terms: Sequence[Term], count: int) -> None:
 def find_best(objective: Objective, options: SearchOptions) -> OptimizeResult:
     """Return the best of the least-squares solutions from all starts.
 
-    Raises the error of the first start if there is none.
+    The targets then have the noise that the residuals show, if it is not known before. Raises the
+    error of the first start if there is none.
     """
     best: OptimizeResult | None = None
     failures: list[ThudError] = []
     for start in starts_of(objective.ranges, int(options.starts), int(options.seed)):
         try:
-            result = minimize(objective, _with_own(objective, start), int(options.max_steps))
+            result = minimize(objective, start, int(options.max_steps))
         except ThudError as error:
             failures.append(error)
             continue
@@ -240,6 +288,20 @@ def find_best(objective: Objective, options: SearchOptions) -> OptimizeResult:
             best = result
     if best is None:
         raise failures[0]
+    for _ in range(MAX_SEARCHES if any(t.comparison.has_own_noise for t in objective.terms) else 0):
+        jacobian, own = objective.jacobian(best.x), best.x * objective.scale
+        pairs = zip(objective.terms, objective.results(best.x), strict=True)
+        reweighted = [
+            term.comparison.reweighted(result, own[term.own], jacobian[term.rows])
+            for term, result in pairs
+        ]
+        if all(n is t.comparison for n, t in zip(reweighted, objective.terms, strict=True)):
+            break
+        objective.terms = [
+            term._replace(comparison=comparison)
+            for term, comparison in zip(objective.terms, reweighted, strict=True)
+        ]
+        best = minimize(objective, best.x, int(options.max_steps))
     return best
 
 
@@ -254,21 +316,18 @@ def starts_of(ranges: Sequence[Range], count: int, seed: int) -> Iterator[Array]
         yield low + x * (high - low)
 
 
-def _with_own(objective: Objective, start: Array) -> Array:
-    """Return a start with the own parameters of the targets."""
-    first = objective.results(start)
-    if not first:
-        message = f"the start cannot be computed: {objective.error}"
-        raise type(objective.error or NumericalError())(message)
-    own = [
-        term.comparison.start(result) / objective.scale[term.own]
-        for term, result in zip(objective.terms, first, strict=True)
-    ]
-    return np.concatenate([start, *own])
-
-
 def minimize(objective: Objective, start: Array, max_steps: int) -> OptimizeResult:
-    """Return the least-squares solution from a start."""
+    """Return the least-squares solution from a start; the targets find missing own parameters."""
+    if len(start) == objective.count:
+        first = objective.results(start)
+        if not first:
+            message = f"the start cannot be computed: {objective.error}"
+            raise type(objective.error or NumericalError())(message)
+        own = [
+            term.comparison.start(result) / objective.scale[term.own]
+            for term, result in zip(objective.terms, first, strict=True)
+        ]
+        start = np.concatenate([start, *own])
     return least_squares(
         objective.residual,
         start,

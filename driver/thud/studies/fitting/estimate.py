@@ -1,4 +1,4 @@
-"""The result of a search: covariance, warnings and assumptions at the best point."""
+"""The estimate at the best point of a search: covariance, unknowns, warnings, assumptions."""
 
 from __future__ import annotations
 
@@ -6,31 +6,20 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy import stats
-from tqdm import tqdm
+from scipy.linalg import qr
 
 from thud.base.errors import NumericalError
 from thud.base.note import Note, of_part
 from thud.base.units import display_unit
+from thud.studies.fitting.comparison import UNLIKELY, coverage_factor
 from thud.studies.fitting.fit_result import Fit, FittedTarget
 from thud.studies.fitting.force_target import GAIN
-from thud.studies.fitting.inference import (
-    Inference,
-    Posterior,
-    coverage_factor,
-    direction_note,
-    infer,
-    posterior,
-    worst_directions,
-)
-from thud.studies.fitting.residual_tests import UNLIKELY
-from thud.studies.fitting.search import Objective, find_best, minimize, require_data
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from thud.studies.arrays import Array
-    from thud.studies.fitting.ranges import Range
-    from thud.studies.fitting.search import Effects, SearchOptions, Term
+    from thud.studies.fitting.search import Effects, Objective, SearchOptions, Term
 
 
 # A parameter closer to a limit than this, relative, lies at it.
@@ -43,8 +32,169 @@ WIDE = 0.5
 CALIBRATION = 1e-2
 # Standard deviations from what is known of an own parameter above which it is unexpected, at 0.1 %.
 EXPECTED = 3.3
-# Maximum number of searches with the noise of the residuals of the one before.
-MAX_SEARCHES = 8
+# Columns of the Jacobian with a smaller norm over that of the target, or a larger relative error,
+# are zero.
+NO_EFFECT = 1e-9
+UNRESOLVED = 0.5
+# Singular values of the Jacobian below this fraction of the maximum, or below this many of its own
+# errors, are zero.
+MIN_RATIO = 1e-6
+ERRORS = 3.0
+# Entries of a unit vector below this are zero.
+NEGLIGIBLE = 1e-3
+# Fraction of the maximum entry below which a message omits a parameter.
+SMALL = 0.05
+
+
+class Inference(NamedTuple):
+    """Covariance of scaled parameters, and directions that are not identifiable.
+
+    Attributes
+    ----------
+    covariance : ndarray, shape (n, n)
+        For residuals of unit variance; infinite where a parameter is not identifiable.
+    singular_values : ndarray, shape (n,)
+        Of the Jacobian with columns of unit length, in descending order.
+    null : ndarray, shape (n_null, n)
+        Changes that leave the residuals as they are, of the fewest parameters.
+    inverse : ndarray, shape (n, m)
+        Pseudoinverse of the Jacobian.
+    """
+
+    covariance: Array
+    singular_values: Array
+    null: Array
+    inverse: Array
+
+
+def infer(jacobian: Array, finer: Array, size: float) -> Inference:
+    """Return covariance, singular values and null directions.
+
+    `jacobian`, shape (m, n), holds derivatives of weighted residuals by scaled parameters, `finer`
+    the same with another step: their difference is the error. `size` is the norm of the target.
+    """
+    count = jacobian.shape[1]
+    length = np.linalg.norm(jacobian, axis=0)
+    change = np.linalg.norm(jacobian - finer, axis=0)
+    dead = (length <= NO_EFFECT * size) | (change > UNRESOLVED * length)
+    length[dead] = 1.0
+    error = np.max(change / length, where=~dead, initial=0.0)
+    rows = len(jacobian)
+    relative = np.pad(np.where(dead, 0.0, jacobian / length), ((0, max(0, count - rows)), (0, 0)))
+    left, values, turned = np.linalg.svd(relative, full_matrices=False)
+    lost = values <= max(MIN_RATIO, ERRORS * error) * values[0]
+    known = turned[~lost] / values[~lost, np.newaxis]
+    covariance = known.T @ known / np.outer(length, length)
+    unknown = (np.abs(turned[lost]) > NEGLIGIBLE).any(axis=0)
+    covariance[unknown] = covariance[:, unknown] = np.nan
+    covariance[unknown, unknown] = np.inf
+    inverse = known.T @ left[:rows, ~lost].T / length[:, np.newaxis]
+    null = turned[lost] / length
+    if len(null):
+        # Another basis, with one entry that is not 0 in each pivot column: the parameters that
+        # vary most represent the directions.
+        _, _, order = qr(null, pivoting=True)
+        basis = np.linalg.solve(null[:, order[: len(null)]], null)
+        null = basis / np.abs(basis).max(axis=1, keepdims=True)
+    return Inference(covariance, values, null, inverse)
+
+
+class Posterior(NamedTuple):
+    """Sizes of effects that a model leaves out, each with a normal prior of mean 0 and variance 1.
+
+    Attributes
+    ----------
+    visible : ndarray, shape (m, n_effect)
+        Effects on the residuals of unit variance that no change of the parameters makes.
+    mean : ndarray, shape (n_effect,)
+        Posterior means.
+    covariance : ndarray, shape (n_effect, n_effect)
+        Posterior covariance.
+    response : ndarray, shape (n, n_effect)
+        Change of the best parameters by a unit of each effect.
+    shift, spread : ndarray, shapes (n,) and (n, n)
+        Change of the best parameters by the effects, and its covariance.
+    evidence : float
+        Logarithm of the likelihood of the residuals, up to a constant.
+    """
+
+    visible: Array
+    mean: Array
+    covariance: Array
+    response: Array
+    shift: Array
+    spread: Array
+    evidence: float
+
+
+def posterior(jacobian: Array, inverse: Array, effects: Array, residual: Array) -> Posterior:
+    """Return the sizes of effects in residuals, model minus target, of unit variance.
+
+    `inverse` is the pseudoinverse of the Jacobian, shape (m, n), of the parameters.
+    """
+    response = -inverse @ effects
+    visible = effects + jacobian @ response
+    # Rows of zeros make the axes complete.
+    extra = max(0, effects.shape[1] - len(residual))
+    left, size, axes = np.linalg.svd(np.pad(visible, ((0, extra), (0, 0))), full_matrices=False)
+    seen = left[: len(residual)].T @ residual
+    mean = -axes.T @ (size / (1 + size**2) * seen)
+    covariance = axes.T / (1 + size**2) @ axes
+    rest = residual - jacobian @ (inverse @ residual)
+    square = rest @ rest - seen**2 @ (size**2 / (1 + size**2))
+    evidence = -0.5 * float(square + np.log1p(size**2).sum())
+    spread = response @ covariance @ response.T
+    return Posterior(visible, mean, covariance, response, response @ mean, spread, evidence)
+
+
+def worst_directions(covariance: Array, maximum: float) -> list[tuple[float, Array]]:
+    """Return directions whose standard deviation exceeds a maximum, with that deviation."""
+    finite = np.flatnonzero(np.isfinite(np.diag(covariance)))
+    variances, vectors = np.linalg.eigh(covariance[np.ix_(finite, finite)])
+    result = []
+    for variance, vector in zip(variances[::-1], vectors.T[::-1], strict=True):
+        if variance > maximum**2:
+            direction = np.zeros(len(covariance))
+            direction[finite] = vector
+            result.append((float(np.sqrt(variance)), direction))
+    return result
+
+
+def direction_note(
+    names: Sequence[str], direction: Array, width: float = np.inf, confidence: float = 1.0
+) -> Note:
+    """Return the note on a direction by its relative half interval; infinite: no effect."""
+    largest = np.abs(direction).max()
+    entries = [
+        (name, float(value / largest))
+        for name, value in zip(names, direction, strict=True)
+        if abs(value) > SMALL * largest
+    ]
+    sign = np.sign(entries[0][1])
+    changes = [f"{name} {sign * value:+.2g} %" for name, value in entries]
+    others: dict[str, float | str] = {
+        "names": _join([name for name, _ in entries]),
+        "changes": _join(changes),
+        "product": _product(entries),
+    }
+    if np.isinf(width):
+        return Note("not_identifiable" if len(entries) > 1 else "no_effect", others=others)
+    code = "hardly_identifiable" if len(entries) > 1 else "hardly_known"
+    size = 100 * width * largest
+    return Note(code, value=float(size), unit="%", others={**others, "confidence": confidence})
+
+
+def _join(words: Sequence[str]) -> str:
+    return f"{', '.join(words[:-1])} and {words[-1]}" if len(words) > 1 else words[0]
+
+
+def _product(entries: Sequence[tuple[str, float]]) -> str:
+    """Return the product of powers that two parameters determine."""
+    if len(entries) != 2:  # noqa: PLR2004 - a pair determines one product of powers
+        return ""
+    (first, a), (second, b) = entries
+    power = -a / b
+    return f"; only {first} * {second}^{power:.3g} is determined, close to these values"
 
 
 class _Point(NamedTuple):
@@ -58,34 +208,6 @@ class _Point(NamedTuple):
     freedom: int | None
     inferred: Inference
     noise: Array
-
-
-def search(
-    terms: Sequence[Term], ranges: Sequence[Range], options: SearchOptions, *, progress: bool
-) -> Fit:
-    """Return the best fit of the parameters of cases to their targets."""
-    require_data(terms, len(ranges))
-    with tqdm(unit="impact", disable=not progress, leave=False) as bar:
-        objective = Objective(terms, ranges, bar)
-        best = find_best(objective, options)
-        for _ in range(MAX_SEARCHES):
-            reweighted = _reweighted(objective, best.x)
-            if all(new is old for new, old in zip(reweighted, objective.terms, strict=True)):
-                break
-            objective.terms = reweighted
-            best = minimize(objective, best.x, int(options.max_steps))
-        return new_fit(objective, best.x, options, converged=best.status > 0)
-
-
-def _reweighted(objective: Objective, x: Array) -> Sequence[Term]:
-    """Return the terms with the noise that the residuals of a point show."""
-    if not any(term.comparison.has_own_noise for term in objective.terms):
-        return objective.terms
-    jacobian, own, result = objective.jacobian(x), x * objective.scale, []
-    for term, computed in zip(objective.terms, objective.results(x), strict=True):
-        new = term.comparison.reweighted(computed, own[term.own], jacobian[term.rows])
-        result.append(term if new is term.comparison else term._replace(comparison=new))
-    return result
 
 
 def new_fit(objective: Objective, x: Array, options: SearchOptions, *, converged: bool) -> Fit:
@@ -136,7 +258,7 @@ def new_fit(objective: Objective, x: Array, options: SearchOptions, *, converged
         names, terms, targets, residual / deviation, deviation, noise_freedom, inferred, noise
     )
     notes = [] if converged else [Note("not_converged")]
-    notes += _identifiability_notes(point, count, confidence) + _at_limits(objective, x, names)
+    notes += _parameter_warnings(point, objective, x, confidence)
     residual_notes, ratio = _residual_warnings(point, wrong)
     notes += [*residual_notes, *effects.failures, *_effect_warning(point, effects, wrong)]
     # The second moment of the posterior about the estimate, for which the case is as assumed.
@@ -165,21 +287,18 @@ def new_fit(objective: Objective, x: Array, options: SearchOptions, *, converged
     )
 
 
-def _identifiability_notes(point: _Point, count: int, confidence: float) -> list[Note]:
-    """Return warnings of parameters of the model that the targets do not determine."""
+def _parameter_warnings(
+    point: _Point, objective: Objective, x: Array, confidence: float
+) -> list[Note]:
+    """Return warnings of parameters that the targets do not determine, or that are at limits."""
     names, noise, null = point.names, point.noise, point.inferred.null
+    count = objective.count
     factor = coverage_factor(confidence, point.freedom)
     # The factor is 0 for a confidence below rounding: no interval is wide then.
     wide = worst_directions(noise[:count, :count], WIDE / factor) if factor else []
     result = [direction_note(names, direction) for direction in null]
     for deviation, direction in wide:
         result.append(direction_note(names[:count], direction, factor * deviation, confidence))
-    return result
-
-
-def _at_limits(objective: Objective, x: Array, names: Sequence[str]) -> list[Note]:
-    """Return warnings of parameters at their limits."""
-    result = []
     ends = zip(names, objective.parameters, x, objective.low, objective.high, strict=True)
     for name, entry, value, low, high in ends:
         if min(value - low, high - value) < AT_LIMIT:

@@ -1,7 +1,7 @@
-"""Noise of a record below a frequency: that of its background, as `thud.recordings` models it.
+"""Records of force: samples, pulse, background and noise, as `thud.recordings` models it.
 
 Records are compared on a grid of an odd number of points with the same Fourier coefficients up to a
-frequency. `to_grid` is orthonormal: white noise stays white and keeps its deviation.
+frequency. `on_grid` is orthonormal: white noise stays white and keeps its deviation.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.linalg import solve_triangular
 
+from thud.base.checks import refuse
 from thud.base.note import Note
 from thud.recordings.background import (
     DRIFT,
@@ -21,15 +22,21 @@ from thud.recordings.background import (
     unit_covariances,
 )
 from thud.recordings.drops import CELL, FOOT, MARGIN, MAX_BACKGROUND
-from thud.studies.fitting.residual_tests import UNLIKELY
+from thud.recordings.formats import MIN_SAMPLES, uniform_grid
+from thud.studies.fitting.comparison import UNLIKELY
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from numpy.typing import NDArray
+
     from thud.recordings.background import Cells
+    from thud.recordings.formats.text import Table
     from thud.studies.arrays import Array
 
 
+# Maximum force, N: its square is finite.
+MAX_FORCE = 1e12
 # Minimum number of independent values in the band that determine the noise.
 MIN_BACKGROUND = 50
 # Minimum frequency of a tone, Hz: below, it is drift within a pulse. Maximum number of tones.
@@ -41,11 +48,58 @@ TONE_EDGE = 0.95
 FLANK = 2 * MARGIN * CELL
 
 
-def to_grid(samples: Array, count: int) -> Array:
-    """Return columns of samples on a grid of `count` points."""
-    spectrum = np.fft.rfft(samples, norm="ortho", axis=0)[: count // 2 + 1]
-    grid: Array = np.fft.irfft(spectrum, count, norm="ortho", axis=0)
-    return grid
+class Record(NamedTuple):
+    """Uniformly spaced times, s, and force, N, both of shape (n_sample,), and sample rate, Hz."""
+
+    time: Array
+    force: Array
+    sample_rate: float
+
+
+def time_and_force(table: Table) -> Array:
+    """Return time, s, and force, N, shape (n_row, 2), of a table of two columns."""
+    columns = table.columns
+    if len(columns) != 2:  # noqa: PLR2004 - time and force
+        count = f"{len(columns[0].values)} rows of {len(columns)} numbers"
+        refuse(f"{table.name}: {count}", "two columns: time, s, and force, N")
+    is_second = columns[1].is_time and not columns[0].is_time
+    time, force = columns[::-1] if is_second else columns
+    return np.column_stack([time.to("s"), force.to("N")])
+
+
+def read_record(table: Array, name: str = "record") -> Record:
+    """Return the record of a table with the columns time, s, and force, N.
+
+    Raise InputError if it has fewer than eight samples, times that are not uniformly spaced, or
+    a force that is not mainly positive.
+    """
+    rows, columns = table.shape
+    if rows < MIN_SAMPLES or columns != 2:  # noqa: PLR2004 - time and force
+        refuse(
+            f"{name}: {rows} rows of {columns} numbers",
+            f"{MIN_SAMPLES} rows or more of time, s, and force, N",
+        )
+    if not np.isfinite(table).all():
+        refuse(f"{name}: a value is not finite", "real numbers")
+    time, force = table.T
+    begin, step, *_ = uniform_grid(time, name)
+    if force.max() <= 0 and not force.min() < 0:
+        refuse(f"{name}: the force is nowhere positive", "the force on the floor, N")
+    if -force.min() > force.max():
+        refuse(
+            f"{name}: the force is mostly negative, {force.min():.4g} to {force.max():.4g} N",
+            "the force on the floor, positive in compression (change its sign)",
+        )
+    if force.max() > MAX_FORCE:
+        refuse(f"{name}: the force has a peak of {force.max():.4g} N", f"up to {MAX_FORCE:g} N")
+    uniform = np.asarray(begin + np.arange(rows) * step, dtype=np.float64)
+    return Record(uniform, force.copy(), 1 / step)
+
+
+def on_grid(spectrum: NDArray[np.complex128]) -> Array:
+    """Return the history of Fourier coefficients, (n, ...), on a grid of 2 n - 1 points."""
+    result: Array = np.fft.irfft(spectrum, 2 * len(spectrum) - 1, norm="ortho", axis=0)
+    return result
 
 
 def grid_covariance(lags: Array, count: int) -> Array:
@@ -232,15 +286,6 @@ class Noise(NamedTuple):
         return result
 
 
-def new_noise(other: Array, predicted: Array) -> Noise:
-    """Return noise that is the sum of two components, of which one is predicted."""
-    count = len(other)
-    deviation = np.sqrt((np.trace(other) - other.sum() / count) / (count - 1))
-    factor = np.linalg.cholesky(other + predicted)
-    whiten = solve_triangular(factor, np.eye(count), lower=True, check_finite=False)
-    return Noise(whiten, predicted, float(deviation))
-
-
 def record_noise(  # noqa: PLR0913 - components of the noise
     time: Array,
     rate: float,
@@ -270,9 +315,14 @@ def record_noise(  # noqa: PLR0913 - components of the noise
         humming = variances[3:] @ rows[2:4]
         tones = [float(note.others["frequency"]) for note in background.tones]
         columns += [DRIFT * background.peak * time, *(offset * cell_waves(samples, tones).T)]
-    trends = to_grid(np.column_stack(columns), count)
+    spectra = np.fft.rfft(np.column_stack(columns), norm="ortho", axis=0)
+    trends = on_grid(spectra[: count // 2 + 1])
     # Covariances of pink and brown noise hold up to a constant, that of an unknown offset; one of
     # the samples is root(n/count) times as large on the grid.
     other = variance * np.eye(count) + grid_covariance(colored, count)
     other += 10 * np.abs(colored).max() * n / count
-    return new_noise(other, grid_covariance(humming, count) + trends @ trends.T)
+    predicted = grid_covariance(humming, count) + trends @ trends.T
+    deviation = np.sqrt((np.trace(other) - other.sum() / count) / (count - 1))
+    factor = np.linalg.cholesky(other + predicted)
+    whiten = solve_triangular(factor, np.eye(count), lower=True, check_finite=False)
+    return Noise(whiten, predicted, float(deviation))
