@@ -149,6 +149,9 @@ def test_results_are_data(example: tuple[Displayed, str], tmp_path: Path) -> Non
     files = [*path.iterdir()] if path.is_dir() else [path]
     assert path.is_dir() == (not ending)
     assert all(file.stat().st_size for file in files)
+    if ending:  # a file of another format is not written under this name
+        with pytest.raises(thud.InputError, match=r"result\.xyz"):
+            result.save(tmp_path / "result.xyz")
 
 
 def test_results_are_drawn(example: tuple[Displayed, str]) -> None:

@@ -16,7 +16,7 @@ import numpy as np
 from thud.base.checks import refuse, shown_text
 from thud.base.errors import ReportWarning
 from thud.base.extras import data_frame, require_extra
-from thud.base.files import replace_file
+from thud.base.files import replace_file, require_ending
 from thud.base.immutable import Immutable
 from thud.base.note import decimal_text
 from thud.base.tables import csv_text
@@ -76,9 +76,9 @@ class Displayed(Immutable, ABC):
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the table to a CSV file, which is replaced as a whole; an OSError names its path.
 
-        Raise InputError if pandas is not installed.
+        Raise InputError if the path does not end with ``.csv`` or pandas is not installed.
         """
-        replace_file(path, self.to_dataframe().to_csv().encode())
+        replace_file(require_ending(path, ".csv"), self.to_dataframe().to_csv().encode())
 
     def _repr_html_(self) -> str:
         rows = zip(chain(["th"], repeat("td")), self.rows(), strict=False)
@@ -129,8 +129,11 @@ class Tabulated(Displayed):
         return csv_text([[*self._named()], *texts])
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write `to_csv` to a file, which is replaced as a whole; an OSError names its path."""
-        replace_file(path, self.to_csv().encode())
+        """Write `to_csv` to a file, which is replaced as a whole; an OSError names its path.
+
+        Raise InputError if the path does not end with ``.csv``.
+        """
+        replace_file(require_ending(path, ".csv"), self.to_csv().encode())
 
     def _named(self) -> dict[str, NDArray[Any]]:
         """Return the values by names of variables, which end with units."""

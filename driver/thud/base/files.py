@@ -45,6 +45,13 @@ def replace_file(path: str | os.PathLike[str], content: bytes) -> None:
         refuse(f"{path!r} is not allowed", "the path of a file", error)
 
 
+def require_ending(path: str | os.PathLike[str], *endings: str) -> Path:
+    """Return a path; raise InputError unless it has one of the endings, in small letters or not."""
+    if not Path(path).name.lower().endswith(endings):
+        refuse(f"{path}: this ending is not known", ", ".join(endings))
+    return Path(path)
+
+
 @dataclass(frozen=True)
 class Results:
     """A directory of results, replaced as a whole; see `thud_result_directory` of the library."""

@@ -16,7 +16,7 @@ from thud.base.bridge import version
 from thud.base.checks import refuse, require_kind, require_whole
 from thud.base.display import Tabulated
 from thud.base.extras import library
-from thud.base.files import replace_file
+from thud.base.files import replace_file, require_ending
 from thud.base.note import Note
 from thud.base.tables import csv_text
 from thud.case.case import case_text
@@ -141,10 +141,8 @@ class BlockedForce(Tabulated):
             If the file cannot be written.
         """
         file = Path(path)
-        kinds = [kind for kind, (ending, _) in EXPORTS.items() if file.name.endswith(ending)]
-        if not kinds:
-            endings = ", ".join(ending for ending, _ in EXPORTS.values())
-            refuse(f"{path}: this ending is not known", endings)
+        name = require_ending(path, *(ending for ending, _ in EXPORTS.values())).name.lower()
+        kinds = [kind for kind, (ending, _) in EXPORTS.items() if name.endswith(ending)]
         if file.is_file() and hashlib.sha256(file.read_bytes()).hexdigest() == self.checksum:
             refuse(f"{path} is the recording of the force", "another path")
         replace_file(path, EXPORTS[kinds[-1]][1](self))

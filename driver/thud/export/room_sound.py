@@ -16,7 +16,7 @@ from thud.base.checks import (
     require_whole,
 )
 from thud.base.display import Tabulated
-from thud.base.files import replace_file
+from thud.base.files import replace_file, require_ending
 from thud.export.floor_sound import REFERENCE_PRESSURE, SAMPLE_RATE, FloorSound, new_floor_sound
 from thud.export.wav import wav_file
 from thud.floors.prediction import RoomPrediction
@@ -105,7 +105,7 @@ class RoomSound(Tabulated):
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the WAV file, replacing an existing one; raise OSError if that is not possible."""
-        replace_file(path, self.wav())
+        replace_file(require_ending(path, ".wav"), self.wav())
 
     def __repr__(self) -> str:
         """Return duration, full scale and levels."""

@@ -11,7 +11,7 @@ from thud.base._schema import FloorOptions
 from thud.base.bridge import ask
 from thud.base.checks import refuse, refuse_value, require_array, require_kind, require_pair
 from thud.base.display import Tabulated
-from thud.base.files import replace_file
+from thud.base.files import replace_file, require_ending
 from thud.base.note import Note
 from thud.base.tables import csv_text
 from thud.case.case import Case, case_text
@@ -115,10 +115,10 @@ class Mobility(Tabulated):
         }
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the table to a CSV file, which `read_mobility` reads."""
+        """Write the table to a CSV file (``.csv``), which `read_mobility` reads."""
         titles = "frequency (Hz)", "real (m/(N s))", "imaginary (m/(N s))"
         columns = np.column_stack([self.frequency, self.values.real, self.values.imag])
-        replace_file(path, csv_text([titles, *columns.tolist()]).encode())
+        replace_file(require_ending(path, ".csv"), csv_text([titles, *columns.tolist()]).encode())
 
     def __repr__(self) -> str:
         """Return name and range of frequencies."""

@@ -14,7 +14,7 @@ from thud.base.bridge import ask
 from thud.base.checks import refuse, require_kind, require_whole
 from thud.base.display import Tabulated
 from thud.base.errors import NumericalError, ThudError
-from thud.base.files import replace_file
+from thud.base.files import replace_file, require_ending
 from thud.base.note import Note
 from thud.case.case import Case
 from thud.floors.mobility import Mobility, mobility
@@ -112,8 +112,8 @@ class MobilityFit(Tabulated):
         }
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write `namelist` to a file."""
-        replace_file(path, self.namelist().encode())
+        """Write `namelist` to a file that ends with ``.nml``."""
+        replace_file(require_ending(path, ".nml"), self.namelist().encode())
 
     def namelist(self) -> str:
         """Return the groups ``&floor`` and ``&measured_mobility`` as text for a case."""

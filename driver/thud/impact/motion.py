@@ -10,9 +10,8 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from thud.base.checks import refuse
 from thud.base.extras import library
-from thud.base.files import replace_file
+from thud.base.files import replace_file, require_ending
 from thud.base.immutable import Immutable
 
 if TYPE_CHECKING:
@@ -138,13 +137,6 @@ def write_vtu(
         file = Path(folder, "mesh.vtu")
         meshio.Mesh(_in_space(position), cells, point_data=fields).write(file)
         replace_file(target, file.read_bytes())
-
-
-def require_ending(path: str | os.PathLike[str], ending: str) -> Path:
-    """Return a path; raise InputError unless it has the ending."""
-    if Path(path).suffix.lower() != ending:
-        refuse(f"{path}: this ending is not known", ending)
-    return Path(path)
 
 
 def _in_space(vectors: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -13,11 +13,10 @@ from matplotlib.colors import Normalize
 from matplotlib.patheffects import withStroke
 
 from thud.base.checks import refuse, require_kind, require_mapping
-from thud.base.files import replace_file
+from thud.base.files import replace_file, require_ending
 from thud.impact.compression import CompressionCurve
 from thud.impact.free_modes import FreeModes
 from thud.impact.impact import Impact
-from thud.impact.motion import require_ending
 from thud.plot.style import (
     WIDTH,
     add_colorbar,

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from thud.base.display import Displayed
+from thud.base.files import require_ending
 from thud.base.note import Note
 from thud.base.tables import format_rows
 from thud.impact.datasets import NO_ERRORS, sample_table, sample_warnings
@@ -69,7 +69,10 @@ class SampleResult(Displayed):
         return sample_table(self.dataset)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write every sample as NetCDF, which `thud.read_sweep` reads."""
+        """Write every sample as NetCDF, which `thud.read_sweep` reads.
+
+        Raise InputError if the path does not end with ``.nc``.
+        """
         from thud.studies.dataset import write_dataset
 
-        write_dataset(self.dataset, Path(path))
+        write_dataset(self.dataset, require_ending(path, ".nc"))
