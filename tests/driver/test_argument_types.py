@@ -89,6 +89,7 @@ def test_functions_take_numbers_of_numpy_and_refuse_wrong_types(tmp_path: Path) 
     [
         thud.read_recording, thud.read_case, thud.read_room_levels, thud.compare,
         thud.assess_levels, lambda wrong: thud.read_recording([], config=wrong or np.ones(2)),
+        lambda wrong: thud.write_case(wrong, "case.nml"),
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("wrong", [None, 5, object()])

@@ -148,6 +148,8 @@ def shown(value: object) -> str:
     """Return the text of a value for a message; of long ones, both ends."""
     if isinstance(value, int) and abs(value) > MAX_NUMBER:
         return "a very large number"
+    if isinstance(value, np.generic):
+        value = value.item()  # its repr names the type
     # Objects store the lists of files as tuples.
     return shown_text(repr(list(value) if type(value) is tuple else value), MAX_SHOWN)
 

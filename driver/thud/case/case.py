@@ -244,5 +244,6 @@ def write_case(case: Case, path: str | os.PathLike[str]) -> None:
     OSError
         If the file cannot be written.
     """
+    require_kind("case", case, Case)
     check_case(case)
     replace_file(path, case_text(case))
