@@ -156,7 +156,8 @@ WARNINGS = {
     "modes or a double hit: the uncertainties include it; tap again",
     # Fits of mobilities.
     "mobility_implausible": "the mean mobility, {value:.2g} {unit}, is not that of a floor "
-    "({low:g} to {high:g} {unit}): check quantity and units (m and N, not mm or kN)",
+    "({low:g} to {high:g} {unit}): check units (m and N, not mm or kN) "
+    "and quantity (not an acceleration or an impedance)",
     "real_part_negative": "the measured real part is negative at {value:.2g} {unit} of the "
     "frequencies, which is impossible for a floor: the fit is nowhere negative",
     "mobility_misfit": "the fit differs from the measurement by {value:.0f} {unit}",
