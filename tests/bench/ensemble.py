@@ -41,9 +41,7 @@ def heights(count: int) -> np.ndarray:
 
 
 def best(
-    function: Callable[[], object],
-    runs: int = 5,
-    clock: Callable[[], float] = time.process_time,
+    function: Callable[[], object], runs: int = 5, clock: Callable[[], float] = time.process_time
 ) -> float:
     """Return the median time of a function, s, after one run to warm up.
 
@@ -264,10 +262,7 @@ def bench_ensemble(scipy_drop: Callable[[], object]) -> None:
     drops = {"height": heights(SETS)}
 
     def run(
-        threads: int = 1,
-        clock: Callable[[], float] = time.process_time,
-        *,
-        levels: bool = True,
+        threads: int = 1, clock: Callable[[], float] = time.process_time, *, levels: bool = True
     ) -> float:
         return best(lambda: solve_shells(drops, threads=threads, levels=levels), 7, clock)
 

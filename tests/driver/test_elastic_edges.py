@@ -67,12 +67,7 @@ def test_strip_on_elastic_edges_has_the_frequency_of_a_beam_on_springs(
     # The springs, those of a wall below, lower the frequency of a beam on supports.
     assert beam < 0.85 * (np.pi / width) ** 2 * np.sqrt(stiffness / mass) / (2 * np.pi)
     found = frequencies_of(floor, 2 * beam)
-    oracle(
-        "lowest frequency of a strip on elastic edges",
-        "closed form",
-        found[0] / beam - 1,
-        1e-2,
-    )
+    oracle("lowest frequency of a strip on elastic edges", "closed form", found[0] / beam - 1, 1e-2)
 
 
 def test_elastic_edges_lie_between_simple_and_clamped_ones() -> None:

@@ -23,10 +23,7 @@ if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
 
-LONG = {
-    "model": {"name": "finite_element"},
-    "mesh": {"radial_elements": 16, "polar_elements": 512},
-}
+LONG = {"model": {"name": "finite_element"}, "mesh": {"radial_elements": 16, "polar_elements": 512}}
 
 
 SHELL = {"model": {"name": "hollow_sphere"}}

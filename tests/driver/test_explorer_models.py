@@ -16,14 +16,7 @@ from thud.base.immutable import plain
 from thud.explorer.answer import answer_case, new_case
 from thud.explorer.form import form
 from thud.explorer.messages import describe_error
-from thud.explorer.models import (
-    FLOOR_FACTS,
-    MODEL_FACTS,
-    SHOWN,
-    floor_facts,
-    model_facts,
-    users_of,
-)
+from thud.explorer.models import FLOOR_FACTS, MODEL_FACTS, SHOWN, floor_facts, model_facts, users_of
 from thud.floors.description import CONTRIBUTIONS
 from thud.impact.compute import compute
 

@@ -59,12 +59,7 @@ def browser() -> Iterator[Browser]:
         found.close()
 
 
-def new_page(
-    browser: Browser,
-    address: str,
-    width: int = 1400,
-    scheme: str = "light",
-) -> Page:
+def new_page(browser: Browser, address: str, width: int = 1400, scheme: str = "light") -> Page:
     """Return the page of a new user, its first answer shown; a fault of its script fails."""
     context = browser.new_context(
         viewport={"width": width, "height": SCREENS[width]},

@@ -323,11 +323,7 @@ def test_table_of_many_reports_is_not_wide_and_of_one_has_no_trend() -> None:
 def test_command_writes_the_chart(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     chart = folder / "chart"
     options = argparse.Namespace(
-        name="history",
-        reports=[str(folder)],
-        output=str(chart),
-        replace=False,
-        quiet=False,
+        name="history", reports=[str(folder)], output=str(chart), replace=False, quiet=False
     )
     assert run_history(options) == 0
     assert sorted(path.name for path in chart.glob("*.*g")) == ["history.svg"]

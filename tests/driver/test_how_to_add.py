@@ -120,9 +120,7 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
         example(page, "fortran band"),
     )
     insert(
-        root / "src/level/source_limits.f90",
-        "sources(*) = [ &\n",
-        example(page, "fortran source"),
+        root / "src/level/source_limits.f90", "sources(*) = [ &\n", example(page, "fortran source")
     )
     quantities = root / "src/impact/quantities.f90"
     impulse = "'time integral of the force on the floor', of_sample), &\n"

@@ -71,9 +71,7 @@ def test_all_levels_of_a_linear_source_change_alike(linear: thud.BallImpedance) 
     np.testing.assert_allclose(linear.change[-1], -20 / np.log(10) * expected / 1e5, rtol=5e-3)
 
 
-def test_limit_of_changes_with_one_over_the_resistance_is_exact(
-    linear: thud.BallImpedance,
-) -> None:
+def test_limit_of_changes_with_one_over_the_resistance_is_exact(linear: thud.BallImpedance) -> None:
     slope = np.array([-900.0, 2500.0, -7000.0, -0.2, 15000.0])
     found = replace(linear, change=slope / linear.resistance[:, None])
     for decibels in (0.5, 1.0, 2.0):

@@ -25,10 +25,7 @@ from thud.floors.resonances import floor_frequencies, resonances, room_frequenci
 from thud.plot.room_figures import draw_levels
 from thud.report.floor_files import contents, page_contents, screen_text
 from thud.report.floor_page import floor_page
-from thud.report.predicted_floor import (
-    PredictedFloor,
-    band_rows,
-)
+from thud.report.predicted_floor import PredictedFloor, band_rows
 
 if TYPE_CHECKING:
     from conftest import ErrorsOf

@@ -224,8 +224,7 @@ def test_figures_of_a_case_predict_its_level_once(monkeypatch: pytest.MonkeyPatc
 
 
 def test_positions_are_drawn_unless_modes_are_none_or_too_many(
-    shell: thud.Impact,
-    monkeypatch: pytest.MonkeyPatch,
+    shell: thud.Impact, monkeypatch: pytest.MonkeyPatch
 ) -> None:
 
     def drawn(floor: thud.Plate, room: thud.Room) -> set[str]:

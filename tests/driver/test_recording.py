@@ -143,8 +143,7 @@ def test_empty_lines_behind_a_table_are_left_out(
 
 
 @pytest.mark.parametrize(
-    ("first", "last"),
-    [("0 1,5", "2, 1,5"), ("0;1,5", "2,;1,5"), ("0 1", "2, 1.500")],
+    ("first", "last"), [("0 1,5", "2, 1,5"), ("0;1,5", "2,;1,5"), ("0 1", "2, 1.500")]
 )
 def test_comma_that_ends_a_number_is_refused_as_decimal_comma(
     first: str, last: str, tmp_path: Path

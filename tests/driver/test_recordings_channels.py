@@ -162,10 +162,7 @@ def test_channels_to_be_added_must_be_forces(tmp_path: Path) -> None:
 
 def test_forces_that_are_left_out_are_named(tmp_path: Path) -> None:
     path = write_table(tmp_path / "cells.csv", cells(), NAMES)
-    for given, missing in (
-        ({"channel": "F1"}, "F2, F3, F4"),
-        ({"channels": "F1+F2+F3"}, "F4"),
-    ):
+    for given, missing in (({"channel": "F1"}, "F2, F3, F4"), ({"channels": "F1+F2+F3"}, "F4")):
         (signal,) = opened(path, **given)
         note = signal.notes[-1]
         assert (note.code, note.others["channels"]) == ("forces_left_out", missing)

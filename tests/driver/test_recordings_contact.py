@@ -14,11 +14,7 @@ from synthetic import cut_drops, half_sine, make_drop
 from thud.impact.contact_time import contact_span
 from thud.level.levels import low_pass
 from thud.recordings import contact as module, drops, measured_drop
-from thud.recordings.background import (
-    cell_means,
-    remove_background,
-    uniform_cells,
-)
+from thud.recordings.background import cell_means, remove_background, uniform_cells
 from thud.recordings.config import Config
 from thud.recordings.contact import Contact, find_contact
 from thud.recordings.drops import Section

@@ -11,14 +11,7 @@ import numpy as np
 import pytest
 from conftest import codes, naming, noted
 from scipy.stats import chi2
-from synthetic import (
-    band_limited,
-    cut_drops,
-    half_sine,
-    make_drop,
-    make_recording,
-    with_force,
-)
+from synthetic import band_limited, cut_drops, half_sine, make_drop, make_recording, with_force
 
 import thud
 from thud.impact.contact_time import contact_span

@@ -15,11 +15,7 @@ from synthetic import coloured_noise, make_drop, noise_density
 
 import thud
 from thud.recordings import background as module
-from thud.recordings.background import (
-    Background,
-    fit_noise,
-    unit_covariances,
-)
+from thud.recordings.background import Background, fit_noise, unit_covariances
 from thud.recordings.contact import band_functionals, band_noise
 
 if TYPE_CHECKING:

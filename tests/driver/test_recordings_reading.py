@@ -21,15 +21,7 @@ import pytest
 import scipy.io
 import soundfile
 from conftest import REPOSITORY, naming
-from recording_files import (
-    PEAK,
-    SOUND,
-    WITH_UNIT,
-    WRITERS,
-    broadcast_chunk,
-    half_sine,
-    opened,
-)
+from recording_files import PEAK, SOUND, WITH_UNIT, WRITERS, broadcast_chunk, half_sine, opened
 
 from thud.base.errors import InputError
 from thud.recordings import calibration

@@ -232,9 +232,7 @@ def test_page_holds_the_rows_of_the_table(written: tuple[Recording, Path]) -> No
         assert words in printed.lower()
 
 
-def test_each_page_has_its_number_and_that_of_the_report(
-    written: tuple[Recording, Path],
-) -> None:
+def test_each_page_has_its_number_and_that_of_the_report(written: tuple[Recording, Path]) -> None:
     recording, folder = written
     pages = [page.get_textpage().get_text_bounded() for page in open_pdf(folder / "report.pdf")]
     for i, text in enumerate(pages, 1):

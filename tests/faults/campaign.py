@@ -66,9 +66,7 @@ def draw(name: str, seed: int) -> tuple[int, random.Random]:
     return seed % SPAN, random.Random(f"{name}/{seed}")  # noqa: S311
 
 
-def each(
-    attempt: Callable[[random.Random], tuple[str, str]],
-) -> Check:
+def each(attempt: Callable[[random.Random], tuple[str, str]]) -> Check:
     """Return the check that makes one attempt after the other."""
     return lambda tries, _: (Finding(*attempt(chance)) for _, chance in tries)
 

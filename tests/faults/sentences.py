@@ -11,7 +11,7 @@ LONGEST = 500
 # What a number that is none, a parser or an interpreter leaves in a sentence.
 INNER = re.compile(
     r"\b([nN]a[nN]|-?[iI]nf(inity)?)\b|\*\*\*|Traceback|<class |object at 0x"
-    r"|\b[A-Z]\w+(Error|Exception)\b|codec|\bndarray\b|\bnumpy\b|\bNone\b|\bdtype\b",
+    r"|\b[A-Z]\w+(Error|Exception)\b|codec|\bndarray\b|\bnumpy\b|\bNone\b|\bdtype\b"
 )
 CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\ud800-\udfff]")
 

@@ -230,10 +230,7 @@ def _core_lines(tree: Tree, room: Path) -> Iterator[tuple[str, int]]:
         notes = counts.with_suffix(".gcno")
         notes.symlink_to("/" / notes.relative_to(room))
         said = run(
-            [GCOV, "--json-format", "--stdout", counts],
-            capture_output=True,
-            check=False,
-            cwd=room,
+            [GCOV, "--json-format", "--stdout", counts], capture_output=True, check=False, cwd=room
         )
         for file in json.loads(said.stdout or '{"files": []}')["files"]:
             path = (tree.build / file["file"]).resolve()

@@ -339,10 +339,7 @@ def get_mobility(
 
 
 def get_conductance(
-    floor: JoistFloor,
-    point: tuple[float, float],
-    nominal: ArrayLike = THIRDS,
-    count: int = 16,
+    floor: JoistFloor, point: tuple[float, float], nominal: ArrayLike = THIRDS, count: int = 16
 ) -> Array:
     """Return the mean real part of the mobility over each one-third-octave band, m/(N s)."""
     return np.array(

@@ -183,12 +183,7 @@ def band_bound(oracle: Drop, lower: float, upper: float) -> tuple[float, float]:
 
 
 def oracle_drop(  # noqa: PLR0913, PLR0917 - what is known of a recording
-    draw: Draw,
-    clean: np.ndarray,
-    onset: float,
-    contact_time: float,
-    deviation: float,
-    drop: Drop,
+    draw: Draw, clean: np.ndarray, onset: float, contact_time: float, deviation: float, drop: Drop
 ) -> tuple[Drop, Estimate]:
     """Return the drop of the best linear estimate: noise and contact are known; no error."""
     rate = draw.rate

@@ -123,9 +123,7 @@ def test_input_holds_the_modes_of_the_elements(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("edge", [SUPPORTED, CLAMPED])
-def test_joist_floors_with_coupled_modes_are_as_compliant_as_elements(
-    edge: Edge,
-) -> None:
+def test_joist_floors_with_coupled_modes_are_as_compliant_as_elements(edge: Edge) -> None:
     """Receivers of such floors added the compliance above the last mode twice, and on joists."""
     floor = JoistFloor(shear=True)
     points = {"joist": (1.7, 2.3), "sheathing": (1.7, 2.1)}

@@ -58,9 +58,7 @@ def building() -> SimpleNamespace:
     rated = tapping.level[: len(walls)]
     screed = 30 * np.log10(tapping.frequency[: len(rated)] / RESONANCE)
     return SimpleNamespace(
-        walls=walls,
-        direct=rated - np.maximum(screed, 0),
-        frequency=tapping.frequency,
+        walls=walls, direct=rated - np.maximum(screed, 0), frequency=tapping.frequency
     )
 
 

@@ -47,10 +47,7 @@ def test_ribs_have_closed_sections() -> None:
     assert loose.spring == 0
     # About the common neutral axis; over the span EN 1995-1-1 annex B weakens the sheathing.
     k = math.pi / 4
-    for part, added in (
-        (1, glued.flange),
-        (0.1, 1 / (1 / screwed.flange + k**2 / screwed.spring)),
-    ):
+    for part, added in ((1, glued.flange), (0.1, 1 / (1 / screwed.flange + k**2 / screwed.spring))):
         sections = [(1.1e10 * 0.06 * 0.22, 0.0), (part * 3e9 * 0.022 * 0.4, 0.121)]
         axis = sum(ea * z for ea, z in sections) / sum(ea for ea, _ in sections)
         expected = sum(ea * (z - axis) ** 2 for ea, z in sections)

@@ -94,9 +94,7 @@ def test_small_compression_of_a_solid_sphere_is_hertz_s(
     oracle("pressed solid ball: force of Hertz", "closed form", limit - 1, error)
 
 
-def test_linear_modes_and_elements_agree_at_small_deflections(
-    oracle: Callable[..., None],
-) -> None:
+def test_linear_modes_and_elements_agree_at_small_deflections(oracle: Callable[..., None]) -> None:
     # Large strain takes 0.5 % off the force for each millimetre, in proportion: extrapolated.
     ball = thud.Ball(poisson_ratio=0.49, youngs_modulus=1.6e6)
     elements = thud.FiniteElement(polar_elements=192, viscosity="none")

@@ -52,8 +52,5 @@ def test_modal_ball_sticks_as_a_half_space(
     expected = sphere_ratio(new_half_space(poisson_ratio, 80))
     assert expected - 1 < 0.6 * (flat_punch_ratio(new_half_space(poisson_ratio, 40)) - 1)
     oracle(
-        "modal ball: force on a sphere that sticks",
-        "independent code",
-        ratio / expected - 1,
-        0.003,
+        "modal ball: force on a sphere that sticks", "independent code", ratio / expected - 1, 0.003
     )

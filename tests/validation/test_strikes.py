@@ -151,8 +151,7 @@ def test_mean_over_strikes_on_joists_does_not_alias_with_them(oracle: Callable[.
 
 
 @pytest.mark.parametrize(
-    "floor",
-    [thud.LaminateFloor(loss_factor=0.01), thud.JoistFloor(loss_factor=0.01), PLATE],
+    "floor", [thud.LaminateFloor(loss_factor=0.01), thud.JoistFloor(loss_factor=0.01), PLATE]
 )
 def test_energy_lost_by_a_floor_contains_what_it_radiates(
     floor: thud.LaminateFloor | thud.JoistFloor | thud.Plate, oracle: Callable[..., None]

@@ -8,13 +8,7 @@ from dataclasses import dataclass, field, fields
 from functools import partial
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
-from thud.base.checks import (
-    refuse,
-    refuse_unknown,
-    refuse_value,
-    require_choice,
-    require_number,
-)
+from thud.base.checks import refuse, refuse_unknown, refuse_value, require_choice, require_number
 from thud.base.files import regular_file
 
 if TYPE_CHECKING:

@@ -5,11 +5,7 @@ from __future__ import annotations
 import math
 from decimal import Decimal
 
-from thud.base.checks import (
-    refuse,
-    require_choice,
-    shown,
-)
+from thud.base.checks import refuse, require_choice, shown
 
 # By base unit, that of a key of this dimension: sizes of units in it.
 SIZES: dict[str, dict[str, float]] = {

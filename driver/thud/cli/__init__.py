@@ -19,14 +19,7 @@ from thud.cli import (  # noqa: F401 - the modules of the commands
     recording_commands,
     study_commands,
 )
-from thud.cli.command import (
-    COMMANDS,
-    FILE_KINDS,
-    exit_code,
-    kind_of,
-    message_of,
-    print_immediately,
-)
+from thud.cli.command import COMMANDS, FILE_KINDS, exit_code, kind_of, message_of, print_immediately
 from thud.cli.screen import is_terminal, print_error
 
 if TYPE_CHECKING:

@@ -143,10 +143,7 @@ def output(meaning: str) -> tuple[Argument, Argument]:
 
 
 def results_of(
-    options: argparse.Namespace,
-    default: str,
-    inputs: Iterable[str | None] = (),
-    subject: str = "",
+    options: argparse.Namespace, default: str, inputs: Iterable[str | None] = (), subject: str = ""
 ) -> Results:
     """Return the results directory of a command, by default in ``outputs``.
 

@@ -7,15 +7,7 @@ from typing import TYPE_CHECKING
 
 from thud.base.errors import NumericalError, ThudError
 from thud.base.files import replace_file
-from thud.cli.command import (
-    NO_FIGURES,
-    QUIET,
-    command,
-    figures_of,
-    files,
-    option,
-    output,
-)
+from thud.cli.command import NO_FIGURES, QUIET, command, figures_of, files, option, output
 from thud.cli.screen import print_notes, print_path, print_results, print_status, shows_progress
 from thud.studies.fit import read_fit_study, run_fit
 from thud.studies.kinds import KINDS, result_type

@@ -88,10 +88,7 @@ def answer_case(case: Case) -> Answer:
 
 
 def common_answer(
-    source: ImpactResult,
-    verdict: Verdict,
-    times: NDArray[np.float64],
-    force: NDArray[np.float64],
+    source: ImpactResult, verdict: Verdict, times: NDArray[np.float64], force: NDArray[np.float64]
 ) -> Answer:
     """Return the entries that all answers have; times are in ms, and `force` is in kN."""
     return {

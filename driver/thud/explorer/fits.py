@@ -69,11 +69,7 @@ def fit_recording(paths: Sequence[str], table: Mapping[str, object], values: Val
 
 
 def _answer(
-    values: Values,
-    case: Case,
-    best: Mapping[str, Any],
-    result: Fit,
-    columns: Mapping[str, Any],
+    values: Values, case: Case, best: Mapping[str, Any], result: Fit, columns: Mapping[str, Any]
 ) -> Answer:
     """Return the values of a case with those of a fit, and what is known of its quality.
 

@@ -8,13 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from thud.base.checks import (
-    refuse,
-    require_kind,
-    require_mapping,
-    require_number,
-    require_whole,
-)
+from thud.base.checks import refuse, require_kind, require_mapping, require_number, require_whole
 from thud.base.display import Tabulated
 from thud.base.files import replace_file, require_ending
 from thud.export.floor_sound import REFERENCE_PRESSURE, SAMPLE_RATE, FloorSound, new_floor_sound

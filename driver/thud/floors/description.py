@@ -36,8 +36,7 @@ CAVEAT = "rigid boxes, no measurement behind it"
 CONTRIBUTIONS = {
     "edges": Contribution("support of the edges", "a stated support, or the modes of the floor"),
     "floor_and_room": Contribution(
-        "data of floor and room",
-        "measured data of the materials and the reverberation time",
+        "data of floor and room", "measured data of the materials and the reverberation time"
     ),
     "source": Contribution("another source that conforms", "a measured force of the source"),
     "model": Contribution("the model: rigid boxes", "a measurement in the building"),

@@ -314,7 +314,6 @@ def _bands_of(frequency: Array, path: object) -> BandSet:
     if missing.size:
         words = ", ".join(f"{f:g}" for f in missing)
         refuse(
-            f"{path}: there is no level at {words} Hz",
-            f"{bands}s {rated[0]:g} to {rated[-1]:g} Hz",
+            f"{path}: there is no level at {words} Hz", f"{bands}s {rated[0]:g} to {rated[-1]:g} Hz"
         )
     return bands

@@ -23,13 +23,7 @@ from thud.base.display import Displayed
 from thud.base.immutable import freeze
 from thud.case.case import Case, case_text, impact_only, new_model
 from thud.case.keys import find_key
-from thud.impact.datasets import (
-    NO_ERRORS,
-    RESULTS,
-    ensemble_dataset,
-    sample_table,
-    sample_warnings,
-)
+from thud.impact.datasets import NO_ERRORS, RESULTS, ensemble_dataset, sample_table, sample_warnings
 from thud.level.levels import FORCES, peak_count
 
 if TYPE_CHECKING:

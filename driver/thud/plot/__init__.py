@@ -27,24 +27,14 @@ from thud.plot.ball_figures import (
     mode_shapes as mode_shapes,
     motion as motion,
 )
-from thud.plot.floor_figures import (
-    ball_impedances as ball_impedances,
-    plate_modes as plate_modes,
-)
-from thud.plot.impact_figures import (
-    force_history as force_history,
-    levels as levels,
-)
+from thud.plot.floor_figures import ball_impedances as ball_impedances, plate_modes as plate_modes
+from thud.plot.impact_figures import force_history as force_history, levels as levels
 from thud.plot.recording_figures import (
     recording_forces as recording_forces,
     recording_levels as recording_levels,
 )
 from thud.plot.room_figures import draw_positions
-from thud.plot.save_figures import (
-    FORMATS as FORMATS,
-    figure_files as figure_files,
-    save as save,
-)
+from thud.plot.save_figures import FORMATS as FORMATS, figure_files as figure_files, save as save
 from thud.plot.style import (
     COLORS as COLORS,
     LINES as LINES,

@@ -268,9 +268,7 @@ _FREQUENCIES = np.geomspace(22.0, 720.0, 1000)
 
 @own_style()
 def ball_impedances(
-    sources: Mapping[str, BallImpedance],
-    floors: Mapping[str, FloorOptions],
-    ax: Axes | None = None,
+    sources: Mapping[str, BallImpedance], floors: Mapping[str, FloorOptions], ax: Axes | None = None
 ) -> Figure:
     """Draw the impedances of sources as filled markers, and of floors as lines.
 

@@ -12,10 +12,7 @@ from thud.floors.description import rating_title
 from thud.impact.contact_time import contact_force
 from thud.level.assessment import octave_limits
 from thud.level.levels import BANDWIDTHS, get_bands
-from thud.plot.impact_figures import (
-    draw_forces,
-    draw_levels,
-)
+from thud.plot.impact_figures import draw_forces, draw_levels
 from thud.plot.style import (
     BAND_NAMES,
     ERROR_BARS,

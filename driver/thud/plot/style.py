@@ -130,12 +130,7 @@ def finish(axes: Axes, ax: Axes | None, title: str = "") -> Figure:
 
 
 def panel_grid(
-    count: int,
-    columns: int,
-    height: float,
-    *,
-    shared: bool = False,
-    ax: Axes | None = None,
+    count: int, columns: int, height: float, *, shared: bool = False, ax: Axes | None = None
 ) -> tuple[Figure, list[Axes]]:
     """Return a figure of column width and its panels, row by row; height of a row in inches.
 

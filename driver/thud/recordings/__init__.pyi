@@ -6,10 +6,7 @@ from .config import (
     ReportConfig as ReportConfig,
     read_config as read_config,
 )
-from .contact import (
-    Contact as Contact,
-    find_contact as find_contact,
-)
+from .contact import Contact as Contact, find_contact as find_contact
 from .drops import (
     Pulse as Pulse,
     Section as Section,
@@ -29,12 +26,6 @@ from .measured_drop import (
     measure_drop as measure_drop,
     measure_stages as measure_stages,
 )
-from .recorded_levels import (
-    average_levels as average_levels,
-    measure_levels as measure_levels,
-)
+from .recorded_levels import average_levels as average_levels, measure_levels as measure_levels
 from .repair import repair as repair
-from .signal import (
-    Signal as Signal,
-    open_signals as open_signals,
-)
+from .signal import Signal as Signal, open_signals as open_signals

@@ -307,10 +307,7 @@ def fit_background(background: Background, impulse: float) -> Background:
 
 
 def fit_noise(
-    cells: Cells,
-    mean: NDArray[np.float64],
-    peak: float,
-    column: NDArray[np.floating] | None = None,
+    cells: Cells, mean: NDArray[np.float64], peak: float, column: NDArray[np.floating] | None = None
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the most likely logarithms of the variances of the noise, and their covariance.
 

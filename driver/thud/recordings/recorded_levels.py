@@ -128,9 +128,7 @@ def measure_levels(drops: Sequence[Drop], bands: BandSet = "octave") -> DropLeve
 
 
 def average_levels(
-    drops: DropLevels,
-    instruments: Mapping[str, NDArray[np.float64]],
-    not_stated: tuple[str, ...],
+    drops: DropLevels, instruments: Mapping[str, NDArray[np.float64]], not_stated: tuple[str, ...]
 ) -> AverageLevels:
     """Return the energy average of the levels of drops, with its budget.
 

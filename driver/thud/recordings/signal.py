@@ -361,11 +361,7 @@ def _find_channel(channels: list[Channel], channel: int | str, name: str) -> Cha
 
 
 def _in_newtons(  # noqa: C901 - each branch is a check
-    file: Path,
-    channel: Channel,
-    name: str,
-    calibration: float | Calibration | None,
-    config: Config,
+    file: Path, channel: Channel, name: str, calibration: float | Calibration | None, config: Config
 ) -> Signal:
     """Return a channel in N; raise InputError if its rate or unit is unknown.
 

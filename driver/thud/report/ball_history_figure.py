@@ -10,15 +10,7 @@ import numpy as np
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.ticker import MultipleLocator
 
-from thud.plot.style import (
-    COLORS,
-    GRAY,
-    WIDTH,
-    escape_label,
-    legend_above,
-    new_figure,
-    own_style,
-)
+from thud.plot.style import COLORS, GRAY, WIDTH, escape_label, legend_above, new_figure, own_style
 from thud.report.ball_history import ACTION, WARNING
 from thud.report.rows import NOT_KNOWN
 

@@ -13,12 +13,7 @@ from thud.floors.description import CAVEAT, rating_title, remedy, source_note, v
 from thud.floors.resonances import floor_frequencies, resonances, room_frequencies
 from thud.level.rating import class_text
 from thud.plot.templates import render
-from thud.report.predicted_floor import (
-    band_rows,
-    difference_text,
-    number_text,
-    octave_titles,
-)
+from thud.report.predicted_floor import band_rows, difference_text, number_text, octave_titles
 
 if TYPE_CHECKING:
     from thud.floors.prediction import RoomPrediction
@@ -52,10 +47,7 @@ def floor_page(floor: PredictedFloor, section: bytes, figure: bytes) -> str:
             *((change.text, difference_text(change)) for change in floor.changes),
         ],
         bands=band_rows(floor),
-        octaves=[
-            ("Maximum Fast levels, octaves", *octave_titles()),
-            ("", *octave_levels),
-        ],
+        octaves=[("Maximum Fast levels, octaves", *octave_titles()), ("", *octave_levels)],
         modes=_mode_rows(prediction),
         resonances="; ".join(
             f"{name} {number_text(f)} Hz" for name, f in resonances(prediction).items()

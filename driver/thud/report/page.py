@@ -64,9 +64,7 @@ class RangePicture(NamedTuple):
 
 
 def report_page(
-    data: ReportData,
-    figures: Iterable[bytes] = (),
-    mark: tuple[str, bytes] | None = None,
+    data: ReportData, figures: Iterable[bytes] = (), mark: tuple[str, bytes] | None = None
 ) -> str:
     """Return the page as self-contained HTML.
 

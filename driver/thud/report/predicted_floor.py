@@ -8,12 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from thud.base._schema import (
-    RATED_BANDS,
-    MeasuredMobility,
-    ModalFloor,
-    Room,
-)
+from thud.base._schema import RATED_BANDS, MeasuredMobility, ModalFloor, Room
 from thud.base.errors import ThudError
 from thud.base.note import decimal_text
 from thud.base.units import display_unit

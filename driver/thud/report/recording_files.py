@@ -124,11 +124,7 @@ def write_report(
 
 
 def save(
-    data: ReportData,
-    results: Results,
-    *,
-    figures: bool = True,
-    stages: Stages | None = None,
+    data: ReportData, results: Results, *, figures: bool = True, stages: Stages | None = None
 ) -> list[Path]:
     """Write levels, criteria and data; with `figures` also the figures and the page.
 

@@ -29,9 +29,7 @@ KINDS = {
         ("grid", "list", "random", "latin_hypercube", "sobol"),
     ),
     "sensitivity": Kind(
-        "Sobol indices: how much each parameter affects each result",
-        ("saltelli",),
-        "_indices.csv",
+        "Sobol indices: how much each parameter affects each result", ("saltelli",), "_indices.csv"
     ),
     "design": Kind("which geometries and materials conform to the standards", ("grid",)),
     "uncertainty": Kind("effect of tolerances on levels and conformity", ("random",)),

@@ -105,9 +105,7 @@ def compute(
 
 
 def run(
-    study: Study,
-    path: str | os.PathLike[str] | None = None,
-    **options: Unpack[RunOptions],
+    study: Study, path: str | os.PathLike[str] | None = None, **options: Unpack[RunOptions]
 ) -> xr.Dataset:
     """Return the results of all samples of a study; a sample that fails has a status and a reason.
 

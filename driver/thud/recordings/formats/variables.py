@@ -13,13 +13,7 @@ from thud.base.checks import refuse
 from thud.base.files import MAX_IN_MEMORY
 from thud.base.units import factor_to, find_unit
 from thud.recordings.formats import MIN_SAMPLES, Channel, rises, uniform_grid
-from thud.recordings.words import (
-    TIME,
-    is_time,
-    read_facts,
-    split_title,
-    text_of,
-)
+from thud.recordings.words import TIME, is_time, read_facts, split_title, text_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
