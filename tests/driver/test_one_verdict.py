@@ -77,7 +77,7 @@ def test_fit_to_its_own_levels_finds_the_ball_again(force: LevelsForce) -> None:
     found = thud.fit(target, {"youngs_modulus": {"start": 1.5e6}}, case)
     assert found.case.ball.youngs_modulus == pytest.approx(1.56e6, rel=1e-6)
     impact = thud.solve(found.case)
-    assert found.impact.peak() == impact.peak()
+    assert found.result.peak() == impact.peak()
     assert found.impact.levels().tolist() == impact.levels().tolist()
 
 
