@@ -205,7 +205,6 @@ def compare_cases(options: argparse.Namespace) -> int:
 KINDS = {
     "wav": "32-bit floats, with their scale in the comment",
     "csv": "table of time and force",
-    "uff": "universal file, data set 58",
     "mat": "MATLAB file of time, force and spectrum",
     "spectrum": "table of the complex spectrum",
 }

@@ -7,7 +7,6 @@ import io
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -15,7 +14,6 @@ import numpy as np
 from thud.base.bridge import version
 from thud.base.checks import refuse, require_kind, require_whole
 from thud.base.display import Tabulated
-from thud.base.extras import library
 from thud.base.files import replace_file, require_ending
 from thud.base.note import Note
 from thud.base.tables import csv_text
@@ -37,9 +35,6 @@ CONVENTION = (
     "F(f) = integral of F(t) exp(-i 2 pi f t) dt, N s, t = 0 at first touch; two-sided spectrum "
     "at f >= 0: F(-f) is the complex conjugate, the energy of a band is 2 * integral of |F|^2 df"
 )
-# Maximum lengths of lines and names in a universal file.
-UFF_LINE = 80
-UFF_NAME = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,8 +124,8 @@ class BlockedForce(Tabulated):
         Parameters
         ----------
         path
-            Path of the file, which ends with ``.wav``, ``.csv``, ``.uff`` or ``.mat``; a table of
-            the spectrum ends with ``_spectrum.csv``.
+            Path of the file, which ends with ``.wav``, ``.csv`` or ``.mat``; a table of the
+            spectrum ends with ``_spectrum.csv``.
 
         Raises
         ------
@@ -225,43 +220,6 @@ def _csv(force: BlockedForce) -> bytes:
     return _table(force.header_lines(), {"time_s": force.time, "force_N": force.force})
 
 
-def _uff(force: BlockedForce) -> bytes:
-    """Return a universal file with a text data set 58: time history of an excitation force, N.
-
-    The format has 12 digits for the force and 6 digits for the time step.
-    """
-    pyuff = library("pyuff", "recordings")
-    kind = f"{KINDS[force.kind]}, N, positive into the floor"
-    start = f"first sample at {force.start:.6g} s since first touch"
-    times = f"Sample rate: {force.sample_rate:.10g} Hz, {start}"
-    lines = [force.name, kind, force.date, times, f"SHA-256: {force.checksum}"]
-    name = _plain(force.name)[:UFF_NAME]
-    data_set = {
-        "type": 58,
-        **{f"id{i}": _plain(line)[:UFF_LINE] or "NONE" for i, line in enumerate(lines, start=1)},
-        "func_type": 1,  # time response
-        "rsp_ent_name": name,
-        "rsp_node": 1,
-        "rsp_dir": -3,  # downwards
-        "ref_node": 0,
-        "ref_dir": 0,
-        "abscissa_spacing": 1,
-        "abscissa_spec_data_type": 17,  # time
-        "abscissa_axis_lab": "time",
-        "abscissa_axis_units_lab": "s",
-        "ordinate_spec_data_type": 13,  # excitation force
-        "ordinate_axis_lab": "force",
-        "ordinate_axis_units_lab": "N",
-        "orddenom_spec_data_type": 0,
-        "x": force.time,
-        "data": force.force,
-    }
-    with TemporaryDirectory() as folder:
-        file = Path(folder, "force.uff")
-        pyuff.UFF(str(file)).write_sets([data_set], "overwrite")
-        return file.read_bytes()
-
-
 def _mat(force: BlockedForce) -> bytes:
     """Return a MATLAB file, version 5: time, force, spectrum and their description."""
     import scipy.io
@@ -300,7 +258,6 @@ def _spectrum(force: BlockedForce) -> bytes:
 EXPORTS = {
     "wav": (".wav", _wav),
     "csv": (".csv", _csv),
-    "uff": (".uff", _uff),
     "mat": (".mat", _mat),
     "spectrum": ("_spectrum.csv", _spectrum),
 }
@@ -311,8 +268,3 @@ def _table(comments: tuple[str, ...], columns: dict[str, NDArray[np.float64]]) -
     rows = np.column_stack(list(columns.values())).tolist()
     header = "".join(f"# {line}\n" for line in comments)
     return (header + csv_text([[*columns], *rows])).encode()
-
-
-def _plain(text: str) -> str:
-    """Return a text in ASCII, as universal files require."""
-    return text.encode("ascii", "replace").decode("ascii")
