@@ -101,7 +101,7 @@ class TomlTable:
             entry.name
             for entry in fields(self)
             if (value := getattr(self, entry.name)) is not None and value is not entry.default
-            if entry.default_factory is not dict or value
+            if entry.default_factory is not dict or not isinstance(value, dict) or value
         ]
 
     def require(self, *names: str) -> None:

@@ -37,9 +37,8 @@ def contact_span(force: ArrayLike, sample_rate: float) -> tuple[float, float]:
     above = np.nonzero(mean >= threshold)[0]
     ends = []
     for inside, outside in ((above[0], above[0] - 1), (above[-1], above[-1] + 1)):
-        fraction = 0.0
-        if 0 <= outside < len(mean):
-            fraction = (mean[inside] - threshold) / (mean[inside] - mean[outside])
+        known = 0 <= outside < len(mean)
+        fraction = (mean[inside] - threshold) / (mean[inside] - mean[outside]) if known else 0.0
         ends.append((inside + fraction * (outside - inside)) / sample_rate)
     return ends[0], ends[1]
 
