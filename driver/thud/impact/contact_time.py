@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from thud.impact.impact import Impact
     from thud.recordings.recording import Recording
 
+    Array = NDArray[np.float64]
+
 # A contact lasts from the first to the last time at which the moving average of the force reaches
 # this fraction of the peak force.
 THRESHOLD = 0.01
@@ -45,7 +47,7 @@ def contact_span(force: ArrayLike, sample_rate: float) -> tuple[float, float]:
 
 def contact_force(
     impact: Impact | FloorImpact | Recording, kind: LevelsForce
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[Array, Array]:
     """Return time since first touch, ms, and low-passed force, kN, during contact.
 
     Force plates record no higher frequencies (paper, section 3), at which meshes and modes ring.
@@ -57,12 +59,7 @@ def contact_force(
     return 1e3 * time[shown], 1e-3 * recorded[shown]
 
 
-def average_within(
-    values: NDArray[np.float64],
-    time: NDArray[np.float64],
-    centers: NDArray[np.float64],
-    width: float,
-) -> NDArray[np.float64]:
+def average_within(values: Array, time: Array, centers: Array, width: float) -> Array:
     """Return moving averages of columns; intervals are cut off at the first and the last time.
 
     The values, shape (n_time, n_column), at uniformly spaced times are interpolated linearly.
