@@ -23,7 +23,7 @@ RECORD = IMPACT.time, IMPACT.floor_force + np.random.default_rng(1).normal(size=
         (RECORD, {"mass": "heavy"}, {}, naming("mass", "start", "'heavy'")),
         (RECORD, {"mass": thud.Parameter(2.5, "a")}, {}, naming("mass", "low", "'a'")),  # type: ignore[arg-type]
         (RECORD, {"mass": thud.Parameter(10**400)}, {}, naming("mass", "start")),
-        (RECORD, {"mass": np.complex128(2)}, {}, naming("mass", "start", "np.complex128")),
+        (RECORD, {"mass": np.complex128(2)}, {}, naming("mass", "start", "2+0j")),
         (RECORD, 3, {}, naming("parameters", "int")),
         (RECORD, ["mass"], {"starts": 10**13}, naming("starts", 10**13, 1, 100000)),
         (RECORD, ["mass"], {"starts": 2, "seed": -1}, naming("seed", -1, 0, 4294967295)),
