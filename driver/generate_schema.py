@@ -83,8 +83,9 @@ INDENT = " " * 8
 LONGEST = 100
 PAGE = """# Keys of an input file
 
-Made by `./bootstrap schema` from the library's own declarations. SI units. `thud --keys` prints the
-same as a commented input file.
+Made by `./bootstrap schema` from the library's own declarations. Each key has its default, its SI
+unit, and its choices or its range: `(` and `)` exclude a limit, `[` and `]` include it.
+`thud --keys` prints the same as a commented input file.
 """
 
 Entry = dict[str, Any]
@@ -96,18 +97,16 @@ def class_name(name: str) -> str:
 
 
 def allowed(key: Entry) -> str:
-    """Return what a key allows, in words."""
+    """Return what a key allows: its choices, or an interval."""
     if key["choices"]:
-        return ", ".join(f'"{choice}"' for choice in key["choices"])
+        return ", ".join(f"`'{choice}'`" for choice in key["choices"])
     if "lower" not in key:
         return ""
-    # As the library writes limits: 1e6.
     ends = [
-        end if isinstance(end, str) else f"{end:g}".replace("e+0", "e").replace("e+", "e")
-        for end in (key["lower"], key["upper"])
+        f"`{end}`" if isinstance(end, str) else f"{end:g}" for end in (key["lower"], key["upper"])
     ]
-    signs = ["<" if key[open_] else "<=" for open_ in ("lower_open", "upper_open")]
-    return f"{ends[0]} {signs[0]} {key['name']} {signs[1]} {ends[1]}"
+    low, high = (end.replace("e+0", "e").replace("e+", "e").replace("e-0", "e-") for end in ends)
+    return f"{'(' if key['lower_open'] else '['}{low}, {high}{')' if key['upper_open'] else ']'}"
 
 
 def choice_name(key: Entry) -> str:
@@ -429,14 +428,14 @@ def page(schema: Entry) -> str:
             owners = sorted({k["owner"] for k in schema["keys"] if k["group"] == group} - {""})
             users = [USERS.get(owner, f"`{owner}`") for owner in owners]
             used = f"Used by {' and '.join(users)}.\n\n" if users else ""
-            text += f"\n## `&{group}`\n\n{used}"
-            text += "| key | default | unit | allowed | meaning |\n|---|---|---|---|---|\n"
+            text = f"{text.rstrip()}\n\n## `&{group}`\n\n{used}"
         default = python_default(key) if key["default"] not in ([], "") else ""
         if key["default"] is None:
             default = standard_values(key, schema["standard_ball"])
-        cells = [f"`{key['name']}`", default, key["unit"], allowed(key), key["meaning"]]
-        text += f"| {' | '.join(cells)} |\n"
-    return text
+        value = f" = {default} {key['unit']}".rstrip() if default else f" {key['unit']}".rstrip()
+        text += f"`{key['name']}`{value}\n: {key['meaning']}"
+        text += f"; {given}\n\n" if (given := allowed(key)) else "\n\n"
+    return f"{text.rstrip()}\n"
 
 
 def main() -> None:

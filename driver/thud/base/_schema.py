@@ -94,22 +94,21 @@ class Ball(Group):
     Attributes
     ----------
     outer_radius : float
-        Outer radius, m; 0 < outer_radius <= 10.
+        Outer radius, m; (0, 10].
     wall_thickness : float
-        Wall thickness, less than the outer radius, m; 0 < wall_thickness < outer_radius.
+        Wall thickness, less than the outer radius, m; (0, `outer_radius`).
     mass : float
-        Mass, kg; 1e-12 <= mass <= 1e6.
+        Mass, kg; [1e-12, 1e6].
     youngs_modulus : float | None
-        Modulus of elasticity, Pa; 0 < youngs_modulus <= 1e13; None: that of the standard ball by
-        the model.
+        Modulus of elasticity, Pa; (0, 1e13]; None: that of the standard ball by the model.
     poisson_ratio : float | None
-        Poisson's ratio; -1 < poisson_ratio <= 0.5; None: that of the standard ball by the model.
+        Poisson's ratio; (-1, 0.5]; None: that of the standard ball by the model.
     gauge_pressure : float
-        Overpressure of the gas in the undeformed ball, Pa; 0 <= gauge_pressure <= 1e8.
+        Overpressure of the gas in the undeformed ball, Pa; [0, 1e8].
     ambient_pressure : float
-        Pressure of the air around the ball, Pa; 0 <= ambient_pressure <= 1e8.
+        Pressure of the air around the ball, Pa; [0, 1e8].
     heat_capacity_ratio : float
-        Ratio of specific heats of the enclosed gas; 1 <= heat_capacity_ratio <= 2.
+        Ratio of specific heats of the enclosed gas; [1, 2].
     """
 
     outer_radius: float = 0.089
@@ -129,9 +128,9 @@ class Drop(Group):
     Attributes
     ----------
     height : float
-        Height of the ball's lowest point above the floor, m; 1e-12 <= height <= 1e6.
+        Height of the ball's lowest point above the floor, m; [1e-12, 1e6].
     gravity : float
-        Acceleration of free fall, m/s2; 1e-12 <= gravity <= 1000.
+        Acceleration of free fall, m/s2; [1e-12, 1000].
     """
 
     height: float = 1.0
@@ -145,11 +144,11 @@ class Sampling(Group):
     Attributes
     ----------
     sample_rate : float
-        Samples per second; from 16000 with finite_element, Hz; 2000 <= sample_rate <= 1e7.
+        Samples per second; from 16000 with finite_element, Hz; [2000, 1e7].
     duration : float
-        Duration of the record from first touch, s; 0.001 <= duration <= 10.
+        Duration of the record from first touch, s; [0.001, 10].
     substeps : int
-        Integration steps per sampling interval; 1 <= substeps <= 10000.
+        Integration steps per sampling interval; [1, 10000].
     verify : bool
         Compute again at a finer resolution, and state the changes.
     """
@@ -167,11 +166,12 @@ class Levels(Group):
     Attributes
     ----------
     method : str
-        Method of computing the levels; "exact", "fft".
+        Method of computing the levels; `'exact'`, `'fft'`.
     bands : str
-        Bands of levels.csv; "octave", "third", "both".
+        Bands of levels.csv; `'octave'`, `'third'`, `'both'`.
     force : str
-        Assessed force, for which levels, peak force and verdict are reported; "floor", "elastic".
+        Assessed force, for which levels, peak force and verdict are reported; `'floor'`,
+        `'elastic'`.
     """
 
     method: LevelsMethod = "exact"
@@ -186,7 +186,7 @@ class Limits(Group):
     Attributes
     ----------
     source : str
-        Source whose limits apply; "rubber_ball", "tyre".
+        Source whose limits apply; `'rubber_ball'`, `'tyre'`.
     """
 
     source: LimitsSource = "rubber_ball"
@@ -199,7 +199,7 @@ class Modes(Group):
     Attributes
     ----------
     count : int
-        Number of elastic free modes; 1 <= count <= 100.
+        Number of elastic free modes; [1, 100].
     """
 
     count: int = 6
@@ -212,12 +212,12 @@ class Compression(Group):
     Attributes
     ----------
     max_deflection : float
-        Maximum approach of the plates, m; 1e-15 <= max_deflection <= 10.
+        Maximum approach of the plates, m; [1e-15, 10].
     points : int
-        Number of points of the curve, including the undeformed ball; 2 <= points <= 10000.
+        Number of points of the curve, including the undeformed ball; [2, 10000].
     gas : str
-        Gas in the ball: leaves through the hole (vented), or is sealed in; "vented", "isothermal",
-        "adiabatic".
+        Gas in the ball: leaves through the hole (vented), or is sealed in; `'vented'`,
+        `'isothermal'`, `'adiabatic'`.
     """
 
     max_deflection: float = 0.04
@@ -234,12 +234,12 @@ class Unknowns(Group):
     key : sequence of str
         Keys of ball, drop and model whose values are not known.
     low : sequence of float
-        Their minima, in the units of the keys; -1e30 <= low <= 1e30.
+        Their minima, in the units of the keys; [-1e30, 1e30].
     high : sequence of float
-        Their maxima; -1e30 <= high <= 1e30.
+        Their maxima; [-1e30, 1e30].
     standard_deviation : sequence of float
-        Standard deviations around the values of the case, truncated by low and high; 0: uniform; 0
-        <= standard_deviation <= 1e30.
+        Standard deviations around the values of the case, truncated by low and high; 0: uniform;
+        [0, 1e30].
     reason : sequence of str
         Reasons of the ranges, with their sources.
     """
@@ -258,64 +258,61 @@ class Room(Group):
     Attributes
     ----------
     length : float
-        Length of the room; 0: that of the floor, m; 0 <= length <= 100.
+        Length of the room; 0: that of the floor, m; [0, 100].
     width : float
-        Width of the room; 0: that of the floor, m; 0 <= width <= 100.
+        Width of the room; 0: that of the floor, m; [0, 100].
     height : float
-        Height of the room; 0: from the volume, without it 2.5 m, m; 0 <= height <= 100.
+        Height of the room; 0: from the volume, without it 2.5 m, m; [0, 100].
     volume : float
-        Volume of the room; 0: length times width times height, m3; 0 <= volume <= 100000.
+        Volume of the room; 0: length times width times height, m3; [0, 100000].
     reverberation_time : float | sequence of float
-        Reverberation time of the room: one, 4 for octaves or 12 for one-third octaves, s; 0.05 <=
-        reverberation_time <= 20.
+        Reverberation time of the room: one, 4 for octaves or 12 for one-third octaves, s; [0.05,
+        20].
     reverberation_of : str
         Room of the reverberation time: finished, or bare, without floor, walls and ceiling;
-        "finished", "bare".
+        `'finished'`, `'bare'`.
     air_density : float
-        Density of the air, kg/m3; 0.5 <= air_density <= 2.
+        Density of the air, kg/m3; [0.5, 2].
     sound_speed : float
-        Speed of sound in the air, m/s; 200 <= sound_speed <= 500.
+        Speed of sound in the air, m/s; [200, 500].
     wall_lengths : sequence of float
-        Lengths of the flanking walls along the floor (default: no walls), m; 0.1 <= wall_lengths
-        <= 100.
+        Lengths of the flanking walls along the floor (default: no walls), m; [0.1, 100].
     wall_height : float
-        Height of the walls, m; 0.5 <= wall_height <= 20.
+        Height of the walls, m; [0.5, 20].
     wall_thickness : float | sequence of float
-        Thickness of the walls: one, or one for each of wall_lengths, m; 0.005 <= wall_thickness <=
-        2.
+        Thickness of the walls: one, or one for each of wall_lengths, m; [0.005, 2].
     wall_density : float | sequence of float
-        Density of the walls: one, or one for each, kg/m3; 10 <= wall_density <= 20000.
+        Density of the walls: one, or one for each, kg/m3; [10, 20000].
     wall_wave_speed : float | sequence of float
-        Speed of longitudinal waves in the walls: one, or one for each, m/s; 100 <= wall_wave_speed
-        <= 10000.
+        Speed of longitudinal waves in the walls: one, or one for each, m/s; [100, 10000].
     wall_loss_factor : float | sequence of float
-        Internal loss factor of the walls: one, or one for each; 0 <= wall_loss_factor <= 1.
+        Internal loss factor of the walls: one, or one for each; [0, 1].
     wall_junction : str
-        Junction of floor and walls: rigid cross or T, or described by junction_index; "cross",
-        "t", "index".
+        Junction of floor and walls: rigid cross or T, or described by junction_index; `'cross'`,
+        `'t'`, `'index'`.
     junction_index : float | sequence of float
         Vibration reduction index from floor to wall, for wall_junction index: one, or one for each
-        wall, dB; -10 <= junction_index <= 80.
+        wall, dB; [-10, 80].
     ceiling_mass : float
-        Mass per unit area of a suspended ceiling; 0: none, kg/m2; 0 <= ceiling_mass <= 200.
+        Mass per unit area of a suspended ceiling; 0: none, kg/m2; [0, 200].
     ceiling_depth : float
-        Depth of the air cavity above the ceiling, m; 0.01 <= ceiling_depth <= 2.
+        Depth of the air cavity above the ceiling, m; [0.01, 2].
     ceiling_loss_factor : float
-        Loss factor of the ceiling cavity; 0.001 <= ceiling_loss_factor <= 1.
+        Loss factor of the ceiling cavity; [0.001, 1].
     corner_x : float
-        Position of the room along the length of a larger floor, m; 0 <= corner_x < 100.
+        Position of the room along the length of a larger floor, m; [0, 100).
     corner_y : float
-        Position of the room along the width of a larger floor, m; 0 <= corner_y < 100.
+        Position of the room along the width of a larger floor, m; [0, 100).
     radiation : str
-        Radiation factor of the floor, by its modes or by ISO 12354-1; "modes", "iso_12354".
+        Radiation factor of the floor, by its modes or by ISO 12354-1; `'modes'`, `'iso_12354'`.
     positions : str
         Positions of ball and microphone: those of the rating, 5 standard ones each (octaves), or
-        16 even ones each; "rating", "standard", "even".
+        16 even ones each; `'rating'`, `'standard'`, `'even'`.
     rating : str
-        Rating that is asked for (KS F ISO 717-2, ISO 717-2, ISO 16283-2); "octaves", "thirds",
-        "standardized".
+        Rating that is asked for (KS F ISO 717-2, ISO 717-2, ISO 16283-2); `'octaves'`, `'thirds'`,
+        `'standardized'`.
     required : float
-        Maximum of that rating that is required; 0: none, dB; 0 <= required <= 200.
+        Maximum of that rating that is required; 0: none, dB; [0, 200].
     """
 
     length: float = 0.0
@@ -353,28 +350,29 @@ class ModalBall(Group):
     ----------
     highest_frequency : float
         Highest frequency of oscillating modes; faster ones follow without inertia; 0: automatic,
-        Hz; 0 <= highest_frequency <= 20000.
+        Hz; [0, 20000].
     rings : int
-        Number of rings on the surface, from the lowest point to 60 degrees; 0: automatic; 0 <=
-        rings <= 400.
+        Number of rings on the surface, from the lowest point to 60 degrees; 0: automatic; [0,
+        400].
     damping_law : str
-        Damping law: loss factor as a function of frequency; "constant", "rising", "fractional".
+        Damping law: loss factor as a function of frequency; `'constant'`, `'rising'`,
+        `'fractional'`.
     loss_factor : float | None
-        Loss factor, twice the damping ratio; 0 <= loss_factor <= 1.9; None: that of the standard
-        ball by the model.
+        Loss factor, twice the damping ratio; [0, 1.9]; None: that of the standard ball by the
+        model.
     loss_frequency : float | None
         Frequency at which loss_factor (rising, fractional) and the modulus (fractional) apply, Hz;
-        0.1 <= loss_frequency <= 100000; None: that of the standard ball by the model.
+        [0.1, 100000]; None: that of the standard ball by the model.
     fractional_order : float
-        Order of the derivative, for fractional; 1: as rising; 0 < fractional_order <= 1.
+        Order of the derivative, for fractional; 1: as rising; (0, 1].
     cavity_gas : bool
         The gas in the cavity resists volume changes.
     contact_gravity : bool
         Gravity acts also during the contact.
     floor_friction : str
-        Friction of the floor: none or infinite (sticking); "none", "stick".
+        Friction of the floor: none or infinite (sticking); `'none'`, `'stick'`.
     static_families : sequence of int
-        Harmonics treated as quasi-static; 0 <= static_families <= 400.
+        Harmonics treated as quasi-static; [0, 400].
     """
 
     name: ClassVar[ModelName] = "modal_ball"
@@ -397,55 +395,50 @@ class FiniteElement(Group):
     Attributes
     ----------
     bounces : int
-        Number of contacts to compute; 1 <= bounces <= 100.
+        Number of contacts to compute; [1, 100].
     flight_before : float
-        Duration of free flight before first touch, s; 0 <= flight_before <= 1.
+        Duration of free flight before first touch, s; [0, 1].
     flight_after : float
-        Duration of free flight after the last contact, s; 0 <= flight_after <= 10.
+        Duration of free flight after the last contact, s; [0, 10].
     step_safety : float
-        Time step divided by a bound on stable steps; 0.01 <= step_safety <= 0.98.
+        Time step divided by a bound on stable steps; [0.01, 0.98].
     radial_elements : int
-        Number of elements through the wall; 0: automatic; 0 <= radial_elements <= 64; group
-        ``&mesh``.
+        Number of elements through the wall; 0: automatic; [0, 64]; group ``&mesh``.
     polar_elements : int
-        Number of elements from pole to pole, from 8; 0: automatic; 0 <= polar_elements <= 1024;
-        group ``&mesh``.
+        Number of elements from pole to pole, from 8; 0: automatic; [0, 1024]; group ``&mesh``.
     law : str
-        Law of elasticity; "neo_hookean", "mooney_rivlin"; group ``&material``.
+        Law of elasticity; `'neo_hookean'`, `'mooney_rivlin'`; group ``&material``.
     mooney_share : float
-        Second-invariant fraction of the shear modulus, for mooney_rivlin; 0 <= mooney_share <= 1;
-        group ``&material``.
-    bulk_ratio : float
-        Maximum ratio of bulk to shear modulus; lower if Poisson's ratio implies a lower one; 2 <=
-        bulk_ratio <= 100000; group ``&material``.
-    viscosity : str
-        Law of viscosity; "none", "kelvin_voigt", "fractional", "constant_loss", "prony"; group
+        Second-invariant fraction of the shear modulus, for mooney_rivlin; [0, 1]; group
         ``&material``.
+    bulk_ratio : float
+        Maximum ratio of bulk to shear modulus; lower if Poisson's ratio implies a lower one; [2,
+        100000]; group ``&material``.
+    viscosity : str
+        Law of viscosity; `'none'`, `'kelvin_voigt'`, `'fractional'`, `'constant_loss'`, `'prony'`;
+        group ``&material``.
     loss_factor : float | None
         Loss factor: at loss_frequency (kelvin_voigt, fractional), or from 10 to 1000 Hz
-        (constant_loss); 0 < loss_factor <= 1; None: that of the standard ball by the model; group
-        ``&material``.
+        (constant_loss); (0, 1]; None: that of the standard ball by the model; group ``&material``.
     loss_frequency : float | None
-        Frequency at which the ball's modulus is the storage modulus, Hz; 1 <= loss_frequency <=
-        10000; None: that of the standard ball by the model; group ``&material``.
+        Frequency at which the ball's modulus is the storage modulus, Hz; [1, 10000]; None: that of
+        the standard ball by the model; group ``&material``.
     fractional_order : float | None
-        Order of the derivative, for fractional; 1: as kelvin_voigt; 0 < fractional_order <= 1;
-        None: that of the standard ball by the model; group ``&material``.
+        Order of the derivative, for fractional; 1: as kelvin_voigt; (0, 1]; None: that of the
+        standard ball by the model; group ``&material``.
     prony_share : sequence of float
-        Moduli of the branches divided by the long-term modulus, for prony; 0 <= prony_share <=
-        1000; group ``&material``.
-    prony_time : sequence of float
-        Relaxation times of the branches, for prony, s; 0 < prony_time <= 1000; group
+        Moduli of the branches divided by the long-term modulus, for prony; [0, 1000]; group
         ``&material``.
+    prony_time : sequence of float
+        Relaxation times of the branches, for prony, s; (0, 1000]; group ``&material``.
     friction : float | None
-        Coefficient of friction between ball and floor; 0 <= friction <= 100; None: that of the
-        standard ball by the model; group ``&contact``.
+        Coefficient of friction between ball and floor; [0, 100]; None: that of the standard ball
+        by the model; group ``&contact``.
     layer_stiffness : float
-        Stiffness per area of a thin layer on the floor; 0: hard floor without a layer, N/m3; 0 <=
-        layer_stiffness <= 1e13; group ``&contact``.
+        Stiffness per area of a thin layer on the floor; 0: hard floor without a layer, N/m3; [0,
+        1e13]; group ``&contact``.
     snapshot_interval : float
-        Time between snapshots of the deformed ball; 0: none, s; 0 <= snapshot_interval <= 10;
-        group ``&output``.
+        Time between snapshots of the deformed ball; 0: none, s; [0, 10]; group ``&output``.
     """
 
     name: ClassVar[ModelName] = "finite_element"
@@ -476,8 +469,8 @@ class HollowSphere(Group):
     Attributes
     ----------
     momentum_flux : str
-        Term for the momentum of wall that enters or leaves the flat cap; "momentum_balance",
-        "retarding", "conservative", "none".
+        Term for the momentum of wall that enters or leaves the flat cap; `'momentum_balance'`,
+        `'retarding'`, `'conservative'`, `'none'`.
     """
 
     name: ClassVar[ModelName] = "hollow_sphere"
@@ -491,11 +484,11 @@ class MeasuredModes(Group):
     Attributes
     ----------
     frequency : sequence of float
-        Natural frequencies of the ball on the floor, Hz; 0.001 <= frequency <= 1e6.
+        Natural frequencies of the ball on the floor, Hz; [0.001, 1e6].
     damping_ratio : sequence of float
-        Damping ratios, one per mode; 0 <= damping_ratio < 1.
+        Damping ratios, one per mode; [0, 1).
     effective_mass : sequence of float
-        Effective masses, one per mode, kg; 1e-12 <= effective_mass <= 1e6.
+        Effective masses, one per mode, kg; [1e-12, 1e6].
     allow_mass_mismatch : bool
         Effective masses need not add up to the mass of the ball.
     """
@@ -514,15 +507,15 @@ class HuntCrossley(Group):
     Attributes
     ----------
     stiffness : float
-        Contact stiffness, N/m^exponent; 0: derived from contact_time; 0 <= stiffness <= 1e15.
+        Contact stiffness, N/m^exponent; 0: derived from contact_time; [0, 1e15].
     contact_time : float
-        Target contact time; 0: derived from stiffness, s; 0 <= contact_time <= 10.
+        Target contact time; 0: derived from stiffness, s; [0, 10].
     exponent : float
-        Exponent of the deflection in the contact force; 1 <= exponent <= 5.
+        Exponent of the deflection in the contact force; [1, 5].
     damping : float
-        Damping coefficient alpha; 0: derived from restitution, s/m; 0 <= damping <= 100.
+        Damping coefficient alpha; 0: derived from restitution, s/m; [0, 100].
     restitution : float
-        Target coefficient of restitution; 0: derived from damping; 0 <= restitution <= 1.
+        Target coefficient of restitution; 0: derived from damping; [0, 1].
     """
 
     name: ClassVar[ModelName] = "hunt_crossley"
@@ -540,24 +533,21 @@ class TwoMass(Group):
     Attributes
     ----------
     belt_mass : float
-        Mass of belt and tread, less than the mass of the source, kg; 0 < belt_mass < 1e6.
+        Mass of belt and tread, less than the mass of the source, kg; (0, 1e6).
     inflation_pressure : float
-        Inflation pressure, Pa; 0 <= inflation_pressure <= 1e8.
+        Inflation pressure, Pa; [0, 1e8].
     contact_width : float
-        Contact area divided by deflection of the contact patch, m; 0 <= contact_width <= 100.
+        Contact area divided by deflection of the contact patch, m; [0, 100].
     carcass_stiffness : float
-        Force of the carcass divided by its deflection, at 20 mm, N/m; 0 <= carcass_stiffness <=
-        1e12.
+        Force of the carcass divided by its deflection, at 20 mm, N/m; [0, 1e12].
     carcass_exponent : float
-        Exponent of the deflection in the force of the carcass; 1.5 <= carcass_exponent <= 5.
+        Exponent of the deflection in the force of the carcass; [1.5, 5].
     contact_damping : float
-        Damping force of the contact divided by elastic force and velocity, s/m; 0 <=
-        contact_damping <= 100.
+        Damping force of the contact divided by elastic force and velocity, s/m; [0, 100].
     belt_frequency : float
-        Natural frequency of the belt on the sidewall with fixed rim, Hz; 0 < belt_frequency <=
-        1e6.
+        Natural frequency of the belt on the sidewall with fixed rim, Hz; (0, 1e6].
     belt_damping : float
-        Damping ratio of the belt on the sidewall with fixed rim; 0 <= belt_damping <= 10.
+        Damping ratio of the belt on the sidewall with fixed rim; [0, 10].
     """
 
     name: ClassVar[ModelName] = "two_mass"
@@ -578,64 +568,61 @@ class RectangularFloor(Group):
     Attributes
     ----------
     source_x : float
-        Relative source position along the length; levels in the room are means over positions; 0 <
-        source_x < 1.
+        Relative source position along the length; levels in the room are means over positions; (0,
+        1).
     source_y : float
-        Relative source position along the width; 0 < source_y < 1.
+        Relative source position along the width; (0, 1).
     support : str
-        Support of the edges; "unknown", "simple", "clamped", "free", "elastic".
+        Support of the edges; `'unknown'`, `'simple'`, `'clamped'`, `'free'`, `'elastic'`.
     support_stiffness : sequence of float
         Stiffness of elastic edges against deflection per length: 1 value, or 4 (x at 0 and length,
-        y at 0 and width), N/m2; 0 <= support_stiffness <= 1e14.
+        y at 0 and width), N/m2; [0, 1e14].
     support_rotation : sequence of float
-        Stiffness of elastic edges against rotation per length: 1 or 4 values, N; 0 <=
-        support_rotation <= 1e14.
+        Stiffness of elastic edges against rotation per length: 1 or 4 values, N; [0, 1e14].
     line_x : sequence of float
-        Positions along the length of walls or beams on which the floor rests, m; 0 < line_x < 100.
+        Positions along the length of walls or beams on which the floor rests, m; (0, 100).
     line_y : sequence of float
-        Positions along the width of walls or beams on which the floor rests, m; 0 < line_y < 100.
+        Positions along the width of walls or beams on which the floor rests, m; (0, 100).
     screed_thickness : float
-        Thickness of a floating plate; 0: none, m; 0 <= screed_thickness <= 0.5.
+        Thickness of a floating plate; 0: none, m; [0, 0.5].
     screed_density : float
-        Density of the floating plate, kg/m3; 10 <= screed_density <= 20000.
+        Density of the floating plate, kg/m3; [10, 20000].
     screed_wave_speed : float
-        Speed of longitudinal waves in the floating plate, m/s; 100 <= screed_wave_speed <= 10000.
+        Speed of longitudinal waves in the floating plate, m/s; [100, 10000].
     screed_loss_factor : float
-        Loss factor of the floating plate; 0 <= screed_loss_factor <= 1.
+        Loss factor of the floating plate; [0, 1].
     layer_stiffness : float
-        Dynamic stiffness of the resilient layer per unit area (ISO 9052-1), N/m3; 10000 <=
-        layer_stiffness <= 1e12.
+        Dynamic stiffness of the resilient layer per unit area (ISO 9052-1), N/m3; [10000, 1e12].
     layer_loss_factor : float
-        Loss factor of the resilient layer; 0 <= layer_loss_factor <= 1.
+        Loss factor of the resilient layer; [0, 1].
     subceiling_thickness : float
-        Thickness of a subceiling that radiates instead of the floor; 0: none, m; 0 <=
-        subceiling_thickness <= 0.2.
+        Thickness of a subceiling that radiates instead of the floor; 0: none, m; [0, 0.2].
     subceiling_density : float
-        Density of the subceiling, kg/m3; 10 <= subceiling_density <= 20000.
+        Density of the subceiling, kg/m3; [10, 20000].
     subceiling_modulus : float
-        Modulus of elasticity of the subceiling in bending, Pa; 1e7 <= subceiling_modulus <= 1e12.
+        Modulus of elasticity of the subceiling in bending, Pa; [1e7, 1e12].
     subceiling_loss_factor : float
-        Loss factor of the subceiling; 0 <= subceiling_loss_factor <= 1.
+        Loss factor of the subceiling; [0, 1].
     channel_stiffness : float
         Stiffness per length of each line that holds the subceiling (channels, battens, hangers),
-        N/m2; 0 <= channel_stiffness <= 1e12.
+        N/m2; [0, 1e12].
     channel_loss_factor : float
-        Loss factor of these lines; 0 <= channel_loss_factor <= 1.
+        Loss factor of these lines; [0, 1].
     cavity_depth : float
-        Depth of the air between floor and subceiling, m; 0.005 <= cavity_depth <= 2.
+        Depth of the air between floor and subceiling, m; [0.005, 2].
     cavity_loss_factor : float
-        Loss factor of this air, high with absorber in it; 0 <= cavity_loss_factor <= 1.
+        Loss factor of this air, high with absorber in it; [0, 1].
     covering_stiffness : float
-        Stiffness of a covering under the source; 0: none, N/m; 0 <= covering_stiffness <= 1e12.
+        Stiffness of a covering under the source; 0: none, N/m; [0, 1e12].
     covering_loss_factor : float
-        Loss factor of the covering at 50 Hz; 0.01 <= covering_loss_factor <= 2.
+        Loss factor of the covering at 50 Hz; [0.01, 2].
     covering_improvement : sequence of float
         Measured reduction of heavy impact sound by a covering, in octaves 63 to 500 Hz or one-
-        third octaves 50 to 630 Hz, dB; -30 <= covering_improvement <= 60.
+        third octaves 50 to 630 Hz, dB; [-30, 60].
     point_x : sequence of float
-        Positions along the length of points whose velocity is computed, m; 0 <= point_x <= 1000.
+        Positions along the length of points whose velocity is computed, m; [0, 1000].
     point_y : sequence of float
-        Positions of these points along the width, m; 0 <= point_y <= 1000.
+        Positions of these points along the width, m; [0, 1000].
     """
 
     source_x: float = 0.5
@@ -680,7 +667,7 @@ class InfinitePlate(Group):
     Attributes
     ----------
     resistance : float
-        Driving-point resistance: force divided by velocity, N s/m; 1 <= resistance <= 1e15.
+        Driving-point resistance: force divided by velocity, N s/m; [1, 1e15].
     """
 
     name: ClassVar[FloorName] = "infinite_plate"
@@ -694,11 +681,11 @@ class Oscillator(Group):
     Attributes
     ----------
     mass : float
-        Moving mass under the source, kg; 0.001 <= mass <= 1e12.
+        Moving mass under the source, kg; [0.001, 1e12].
     stiffness : float
-        Stiffness of the support, N/m; 0 <= stiffness <= 1e15.
+        Stiffness of the support, N/m; [0, 1e15].
     damping : float
-        Damping coefficient of the support, N s/m; 0 <= damping <= 1e12.
+        Damping coefficient of the support, N s/m; [0, 1e12].
     """
 
     name: ClassVar[FloorName] = "oscillator"
@@ -714,31 +701,27 @@ class Plate(RectangularFloor):
     Attributes
     ----------
     length : float
-        Length of the floor, m; 0.5 <= length <= 100.
+        Length of the floor, m; [0.5, 100].
     width : float
-        Width of the floor, m; 0.5 <= width <= 100.
+        Width of the floor, m; [0.5, 100].
     thickness : float
-        Thickness of the floor, m; 0.001 <= thickness <= 2.
+        Thickness of the floor, m; [0.001, 2].
     density : float
-        Density of the floor, kg/m3; 10 <= density <= 20000.
+        Density of the floor, kg/m3; [10, 20000].
     wave_speed : float
-        Speed of longitudinal waves in the floor, m/s; 100 <= wave_speed <= 10000.
+        Speed of longitudinal waves in the floor, m/s; [100, 10000].
     stiffness_ratio : float
-        Ratio of the bending stiffness along the width to that along the length; 0.0001 <=
-        stiffness_ratio <= 10000.
+        Ratio of the bending stiffness along the width to that along the length; [0.0001, 10000].
     torsion_ratio : float
-        Ratio of the twisting stiffness to the geometric mean of both bending stiffnesses; 0 <=
-        torsion_ratio <= 1.
+        Ratio of the twisting stiffness to the geometric mean of both bending stiffnesses; [0, 1].
     loss_factor : float
-        Internal loss factor of the floor; 0 <= loss_factor <= 1.
+        Internal loss factor of the floor; [0, 1].
     edges : str
-        Losses at the edges of the floor; "building", "laboratory", "absorption".
+        Losses at the edges of the floor; `'building'`, `'laboratory'`, `'absorption'`.
     edge_absorption : float
-        Sum of edge lengths times absorption coefficients, for absorption, m; 0 <= edge_absorption
-        <= 1000.
+        Sum of edge lengths times absorption coefficients, for absorption, m; [0, 1000].
     channel_spacing : float
-        Distance of the lines that hold the subceiling, which run along the length, m; 0.05 <=
-        channel_spacing <= 100.
+        Distance of the lines that hold the subceiling, which run along the length, m; [0.05, 100].
     """
 
     name: ClassVar[FloorName] = "plate"
@@ -762,32 +745,30 @@ class LaminateFloor(RectangularFloor):
     Attributes
     ----------
     length : float
-        Length of the floor, along the grain of the first layer, m; 0.5 <= length <= 100.
+        Length of the floor, along the grain of the first layer, m; [0.5, 100].
     width : float
-        Width of the floor, m; 0.5 <= width <= 100.
+        Width of the floor, m; [0.5, 100].
     layer_thickness : sequence of float
-        Thicknesses of the crossed layers from the top (default: 40, 20, 40, 20, 40 mm), m; 0.003
-        <= layer_thickness <= 0.5.
+        Thicknesses of the crossed layers from the top (default: 40, 20, 40, 20, 40 mm), m; [0.003,
+        0.5].
     youngs_modulus : float
-        Modulus of elasticity along the grain, Pa; 1e8 <= youngs_modulus <= 1e12.
+        Modulus of elasticity along the grain, Pa; [1e8, 1e12].
     cross_modulus : float
-        Modulus of elasticity across the grain, Pa; 0 <= cross_modulus <= 1e12.
+        Modulus of elasticity across the grain, Pa; [0, 1e12].
     shear_modulus : float
-        Shear modulus along the grain, Pa; 1e6 <= shear_modulus <= 1e12.
+        Shear modulus along the grain, Pa; [1e6, 1e12].
     rolling_shear_modulus : float
-        Modulus of rolling shear, Pa; 1e6 <= rolling_shear_modulus <= 1e12.
+        Modulus of rolling shear, Pa; [1e6, 1e12].
     torsion_factor : float
-        Fraction of the torsional stiffness that joints between boards leave; 0 <= torsion_factor
-        <= 1.
+        Fraction of the torsional stiffness that joints between boards leave; [0, 1].
     density : float
-        Density of the layers, kg/m3; 10 <= density <= 20000.
+        Density of the layers, kg/m3; [10, 20000].
     added_mass : float
-        Mass without stiffness on the plate, as gravel, kg/m2; 0 <= added_mass <= 1000.
+        Mass without stiffness on the plate, as gravel, kg/m2; [0, 1000].
     loss_factor : float
-        Loss factor of the floor including its edges, without radiation; 0 < loss_factor <= 1.
+        Loss factor of the floor including its edges, without radiation; (0, 1].
     channel_spacing : float
-        Distance of the lines that hold the subceiling, which run along the length, m; 0.05 <=
-        channel_spacing <= 100.
+        Distance of the lines that hold the subceiling, which run along the length, m; [0.05, 100].
     """
 
     name: ClassVar[FloorName] = "laminate_floor"
@@ -812,33 +793,33 @@ class JoistFloor(RectangularFloor):
     Attributes
     ----------
     length : float
-        Span of the joists, m; 0.5 <= length <= 100.
+        Span of the joists, m; [0.5, 100].
     width : float
-        Width of the floor across the joists, m; 0.5 <= width <= 100.
+        Width of the floor across the joists, m; [0.5, 100].
     sheathing_thickness : float
-        Thickness of the sheathing, m; 0.003 <= sheathing_thickness <= 0.3.
+        Thickness of the sheathing, m; [0.003, 0.3].
     sheathing_density : float
-        Density of the sheathing, kg/m3; 10 <= sheathing_density <= 20000.
+        Density of the sheathing, kg/m3; [10, 20000].
     sheathing_modulus : float
-        Modulus of elasticity of the sheathing in bending, Pa; 1e7 <= sheathing_modulus <= 1e12.
+        Modulus of elasticity of the sheathing in bending, Pa; [1e7, 1e12].
     spacing : float
-        Distance between the axes of adjacent joists, m; joist_width < spacing < width.
+        Distance between the axes of adjacent joists, m; (`joist_width`, `width`).
     joist_width : float
-        Width of a joist, m; 0.005 <= joist_width <= 1.
+        Width of a joist, m; [0.005, 1].
     joist_height : float
-        Height of a joist, m; 0.01 <= joist_height <= 2.
+        Height of a joist, m; [0.01, 2].
     joist_density : float
-        Density of the joists, kg/m3; 10 <= joist_density <= 20000.
+        Density of the joists, kg/m3; [10, 20000].
     joist_modulus : float
-        Modulus of elasticity of the joists, Pa; 1e7 <= joist_modulus <= 1e12.
+        Modulus of elasticity of the joists, Pa; [1e7, 1e12].
     connection : float
         Composite action of sheathing and joists over the span, 0 (loose) to 1 (glued), EN 1995-1-1
-        annex B; 0 <= connection <= 1.
+        annex B; [0, 1].
     loss_factor : float
-        Loss factor of the floor including its edges, without radiation; 0 < loss_factor <= 1.
+        Loss factor of the floor including its edges, without radiation; (0, 1].
     source_on : str
         Impact location: midway between the next joists, on the next joist, or exactly the
-        position; "sheathing", "joist", "position".
+        position; `'sheathing'`, `'joist'`, `'position'`.
     """
 
     name: ClassVar[FloorName] = "joist_floor"
@@ -864,44 +845,39 @@ class MeasuredMobility(Group):
     Attributes
     ----------
     direct : float
-        Limit of the mobility at high frequencies, m/(N s); 0 <= direct <= 1000.
+        Limit of the mobility at high frequencies, m/(N s); [0, 1000].
     pole_frequency : sequence of float
-        Magnitudes of the poles divided by 2 pi, Hz; 1e-06 <= pole_frequency <= 1e7.
+        Magnitudes of the poles divided by 2 pi, Hz; [1e-6, 1e7].
     damping_ratio : sequence of float
-        Damping ratios of the poles; 1 for a real pole; 1e-12 <= damping_ratio <= 1.
+        Damping ratios of the poles; 1 for a real pole; [1e-12, 1].
     residue_real : sequence of float
-        Real parts of the residues, doubled for a pair of poles, m/(N s2); -1e12 <= residue_real <=
-        1e12.
+        Real parts of the residues, doubled for a pair of poles, m/(N s2); [-1e12, 1e12].
     residue_imaginary : sequence of float
-        Imaginary parts of the residues, doubled for a pair of poles, m/(N s2); -1e12 <=
-        residue_imaginary <= 1e12.
+        Imaginary parts of the residues, doubled for a pair of poles, m/(N s2); [-1e12, 1e12].
     lowest_frequency : float
-        Lowest frequency of the measurement, Hz; 0 < lowest_frequency < highest_frequency.
+        Lowest frequency of the measurement, Hz; (0, `highest_frequency`).
     highest_frequency : float
-        Highest frequency of the measurement, Hz; 0 < highest_frequency <= 1e7.
+        Highest frequency of the measurement, Hz; (0, 1e7].
     length : float
-        Length of the floor, m; 0.5 <= length <= 100.
+        Length of the floor, m; [0.5, 100].
     width : float
-        Width of the floor, m; 0.5 <= width <= 100.
+        Width of the floor, m; [0.5, 100].
     thickness : float
-        Thickness of the plate that radiates into a room; 0: none, m; 0 <= thickness <= 2.
+        Thickness of the plate that radiates into a room; 0: none, m; [0, 2].
     density : float
-        Density of the floor, kg/m3; 10 <= density <= 20000.
+        Density of the floor, kg/m3; [10, 20000].
     wave_speed : float
-        Speed of longitudinal waves in the floor, m/s; 100 <= wave_speed <= 10000.
+        Speed of longitudinal waves in the floor, m/s; [100, 10000].
     stiffness_ratio : float
-        Ratio of the bending stiffness along the width to that along the length; 0.0001 <=
-        stiffness_ratio <= 10000.
+        Ratio of the bending stiffness along the width to that along the length; [0.0001, 10000].
     torsion_ratio : float
-        Ratio of the twisting stiffness to the geometric mean of both bending stiffnesses; 0 <=
-        torsion_ratio <= 1.
+        Ratio of the twisting stiffness to the geometric mean of both bending stiffnesses; [0, 1].
     loss_factor : float
-        Internal loss factor of the floor; 0 <= loss_factor <= 1.
+        Internal loss factor of the floor; [0, 1].
     edges : str
-        Losses at the edges of the floor; "building", "laboratory", "absorption".
+        Losses at the edges of the floor; `'building'`, `'laboratory'`, `'absorption'`.
     edge_absorption : float
-        Sum of edge lengths times absorption coefficients, for absorption, m; 0 <= edge_absorption
-        <= 1000.
+        Sum of edge lengths times absorption coefficients, for absorption, m; [0, 1000].
     """
 
     name: ClassVar[FloorName] = "measured_mobility"
@@ -933,29 +909,27 @@ class ModalFloor(Group):
     file : str
         File of the modes: frequencies, loss factors, shapes on a grid.
     source_x : float
-        Relative source position along the length; levels in the room are means over positions; 0 <
-        source_x < 1.
+        Relative source position along the length; levels in the room are means over positions; (0,
+        1).
     source_y : float
-        Relative source position along the width; 0 < source_y < 1.
+        Relative source position along the width; (0, 1).
     residual_compliance : float
         Static compliance at the source of the modes above those of the file; 0: that of the plate,
-        m/N; 0 <= residual_compliance <= 1.
+        m/N; [0, 1].
     thickness : float
-        Thickness of the plate that radiates into a room; 0: none, m; 0 <= thickness <= 2.
+        Thickness of the plate that radiates into a room; 0: none, m; [0, 2].
     density : float
-        Density of the floor, kg/m3; 10 <= density <= 20000.
+        Density of the floor, kg/m3; [10, 20000].
     wave_speed : float
-        Speed of longitudinal waves in the floor, m/s; 100 <= wave_speed <= 10000.
+        Speed of longitudinal waves in the floor, m/s; [100, 10000].
     stiffness_ratio : float
-        Ratio of the bending stiffness along the width to that along the length; 0.0001 <=
-        stiffness_ratio <= 10000.
+        Ratio of the bending stiffness along the width to that along the length; [0.0001, 10000].
     torsion_ratio : float
-        Ratio of the twisting stiffness to the geometric mean of both bending stiffnesses; 0 <=
-        torsion_ratio <= 1.
+        Ratio of the twisting stiffness to the geometric mean of both bending stiffnesses; [0, 1].
     point_x : sequence of float
-        Positions along the length of points whose velocity is computed, m; 0 <= point_x <= 1000.
+        Positions along the length of points whose velocity is computed, m; [0, 1000].
     point_y : sequence of float
-        Positions of these points along the width, m; 0 <= point_y <= 1000.
+        Positions of these points along the width, m; [0, 1000].
     """
 
     name: ClassVar[FloorName] = "modal_floor"
