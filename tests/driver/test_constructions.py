@@ -15,7 +15,7 @@ from test_figure_look import assert_clean
 import thud
 from thud import cli
 from thud.base import files
-from thud.case.constructions import CEILING_KEYS, construction_rows
+from thud.case.constructions import CEILING_KEYS
 from thud.report.predicted_floor import PredictedFloor
 
 if TYPE_CHECKING:
@@ -254,17 +254,6 @@ def test_bad_file_is_refused_in_one_sentence(
     with pytest.raises(thud.InputError, match=naming(path, "allowed", *parts)) as caught:
         thud.construction(path)
     assert "\n" not in str(caught.value)
-
-
-def test_page_lists_the_library() -> None:
-    page = (REPOSITORY / "docs/constructions.md").read_text(encoding="utf-8")
-    table = page.partition("<!-- table -->\n")[2].partition("<!-- end -->")[0].splitlines()[2:]
-    listed = [tuple(line.strip("| ").split(" | ")) for line in table]
-    library = list(thud.constructions().values())
-    _, *rows = construction_rows(library)
-    assert listed == [
-        (*row, f"`{entry.floor.name}`") for entry, row in zip(library, rows, strict=True)
-    ]
 
 
 def test_file_of_the_page_is_a_construction(tmp_path: Path) -> None:

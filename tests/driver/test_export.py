@@ -1,4 +1,4 @@
-"""The blocked force in files for other programs, and a plate that it drives."""
+"""The blocked force in files for other programs."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY, codes, load_script, names_in, naming
+from conftest import REPOSITORY, codes, names_in, naming
 from recording_files import opened
-from scipy.sparse.linalg import eigsh
 from synthetic import make_recording
 
 import thud
@@ -198,42 +197,3 @@ def test_bad_input_gets_one_sentence(
         export(str(recording.parent / source), *words, "-o", str(tmp_path / "out"))
     assert "\n" not in str(caught.value)
     assert not (tmp_path / "out").exists()
-
-
-@pytest.fixture(scope="module")
-def plate():  # noqa: ANN201 - a module
-    """Return the example."""
-    return load_script("docs/examples/plate_scikit_fem.py")
-
-
-def test_frequency_of_the_plate_of_scikit_fem_is_of_fourth_order(plate) -> None:  # noqa: ANN001
-    length, width = plate.LENGTH, plate.WIDTH
-    exact = ((np.pi / length) ** 2 + (np.pi / width) ** 2) * np.sqrt(plate.STIFFNESS / plate.MASS)
-    errors = []
-    for elements in (2, 4, 8):
-        found = plate.new_plate(elements)
-        (value,) = eigsh(found.stiffness.tocsc(), 1, found.mass.tocsc(), sigma=0)[0]
-        errors.append(np.sqrt(value) / exact - 1)
-    assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx(4, abs=0.2)
-
-
-def test_velocity_of_the_plate_of_scikit_fem_is_that_of_the_modal_sum(plate) -> None:  # noqa: ANN001
-    rate = 22050.0
-    force = np.pad(half_sine(rate).force, (0, 220))
-    exact = plate.modal_velocity(force, 1 / rate)
-    largest = np.abs(exact).max()
-    # The kinks of the pulse reach modes whose waves are as short as the elements: second order.
-    misses = [
-        np.abs(plate.plate_velocity(plate.new_plate(n), force, 1 / rate) - exact).max() / largest
-        for n in (4, 8)
-    ]
-    assert misses[1] < misses[0] / 4
-    assert misses[1] < 0.02
-
-
-def test_example_reads_exported_force(plate, tmp_path: Path) -> None:  # noqa: ANN001
-    path = tmp_path / "force.csv"
-    FORCE.save(path)
-    force, step = plate.read_force(path)
-    assert np.array_equal(force, FORCE.force)
-    assert step == pytest.approx(1 / 44100.0, rel=1e-12)
