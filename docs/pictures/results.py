@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 REPOSITORY = Path(__file__).parents[2]
 INPUTS = REPOSITORY / "inputs"
 STUDIES = INPUTS / "studies"
-EXAMPLE = REPOSITORY / "docs/examples/plate_scikit_fem.py"
 
 
 @cache
@@ -62,20 +61,6 @@ def floors() -> Figure:
     return thud.compare_floors({path.stem: thud.read_case(path) for path in paths}).plot()
 
 
-def comparison() -> Figure:
-    """Draw four models."""
-    paths = sorted((INPUTS / "comparison").glob("*.nml"))
-    return thud.compare({path.stem: thud.read_case(path) for path in paths}).plot()
-
-
-def plate_velocity() -> Figure:
-    """Draw the velocity of the plate of the example for scikit-fem."""
-    impact = thud.solve(thud.read_case(INPUTS / "rubber_ball_fe.nml"))
-    draw = runpy.run_path(str(EXAMPLE))["draw"]
-    figure: Figure = draw(impact.floor_force, 1 / impact.sample_rate)
-    return figure
-
-
 def validation_figures() -> dict[str, Callable[[], Figure]]:
     """Return the figures of the page on validation by name."""
     page = runpy.run_path(str(REPOSITORY / "docs/site/validation.py"))
@@ -84,7 +69,6 @@ def validation_figures() -> dict[str, Callable[[], Figure]]:
 
 
 RESULTS: dict[str, Callable[[], Figure]] = {
-    "comparison": comparison,
     "construction": lambda: thud.construction(
         "CLT 160, gravel, screed on 10 MN/m3, ceiling"
     ).plot(),
@@ -96,7 +80,6 @@ RESULTS: dict[str, Callable[[], Figure]] = {
     "floors": floors,
     "law_of_loss": lambda: study("sweep", "law_of_loss").plot(),
     "modal_room": lambda: thud.modal_room(prediction()).plot(),
-    "plate_velocity": plate_velocity,
     "room_levels": lambda: thud.read_room_levels(
         INPUTS / "floors/field_levels.csv", volume=41.4
     ).plot(),

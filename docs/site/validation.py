@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 DOCS = Path(__file__).parents[1]
 RECORD = DOCS / "validation.json"
 PAGE = DOCS / "validation.md"
-TEXT = Path(__file__).parent / "validation.md"
+TEXT = Path(__file__).parent / "validation.md.in"
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 # Kinds of oracles in the order of their strength, with what they are.
 KINDS = {
@@ -42,35 +42,24 @@ def number(value: float, unit: str) -> str:
     """Return a number of two digits with its unit."""
     if value and not 1e-3 <= abs(value) < 1e4:  # noqa: PLR2004 - as people write them
         mantissa, exponent = f"{value:.1e}".split("e")
-        shown = f"{mantissa} · 10{str(int(exponent)).translate(RAISED)}"
+        shown = f"{mantissa}·10{str(int(exponent)).translate(RAISED)}"
     else:
         shown = f"{value:.2g}"
     # Blanks that do not break.
     return f"{shown} {unit}".strip().replace(" ", "\u00a0")
 
 
-def table(oracles: list[dict[str, Any]]) -> str:
-    """Return the tables of all kinds of oracles."""
+def lists(oracles: list[dict[str, Any]]) -> str:
+    """Return the lists of all kinds of oracles."""
     parts = []
     for kind, meaning in KINDS.items():
         rows = [
-            f"| {o['what']} | {number(o['measured'], o['unit'])} | {number(o['bound'], o['unit'])} "
-            f"| `{o['test'].partition('::')[0].removeprefix('tests/')}` |"
+            f"- {o['what']}: {number(o['measured'], o['unit'])} ({number(o['bound'], o['unit'])})"
             for o in oracles
             if o["kind"] == kind
         ]
         title = f"### {kind.capitalize()}" + (f": {meaning}" if meaning else "")
-        parts.append(
-            "\n".join(
-                [
-                    title,
-                    "",
-                    "| result | largest difference | allowed | test |",
-                    "|---|---|---|---|",
-                    *rows,
-                ]
-            )
-        )
+        parts.append("\n".join([title, "", *rows]))
     return "\n\n".join(parts)
 
 
@@ -163,7 +152,7 @@ def page(record: dict[str, Any]) -> str:
         "count": str(len(record["oracles"])),
         "version": record["version"],
         "date": record["date"],
-        "tables": table(record["oracles"]),
+        "lists": lists(record["oracles"]),
     }
     for name, value in given.items():
         text = text.replace(f"@{name}@", value)

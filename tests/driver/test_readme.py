@@ -1,4 +1,4 @@
-"""The README shows what the program prints, and the page of the commands has all of them."""
+"""README and tutorial show what the program prints; the page of commands has all of them."""
 
 from __future__ import annotations
 
@@ -15,13 +15,8 @@ from thud.base.tables import WIDTH, format_rows, wrap
 from thud.comparison.comparison import read_all
 
 README = (REPOSITORY / "README.md").read_text(encoding="utf-8")
-BLOCKS = re.findall(r"```(\w*)\n(.*?)```", README, re.DOTALL)
-
-
-def shown_after(marker: str) -> str:
-    """Return the block of output that follows a block with some words, or the first with them."""
-    places = [i for i, (_, text) in enumerate(BLOCKS) if marker in text]
-    return BLOCKS[places[0]][1]
+TUTORIAL = (REPOSITORY / "docs/tutorials/paper.md").read_text(encoding="utf-8")
+BLOCK = re.compile(r"^```([\w{}-]*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
 
 def without_times(text: str) -> list[str]:
@@ -36,25 +31,24 @@ def test_first_result_is_that_of_the_commands() -> None:
     paths = [str(REPOSITORY / path) for path in cases[1].split()]
     page = thud.compare(read_all(paths))
     expected = wrap(format_rows(page.rows()))
-    shown = shown_after("assessed force")
+    (shown,) = (text for _, text in BLOCK.findall(TUTORIAL) if "assessed force" in text)
     assert without_times(shown) == [
         *without_times(expected), "Results: outputs/comparison"
     ]  # fmt: skip
 
 
 def test_outputs_fit_a_terminal() -> None:
-    for _, text in BLOCKS:
+    for _, text in BLOCK.findall(README):
         assert max(map(len, text.splitlines())) <= WIDTH
 
 
 @pytest.mark.slow
 def test_python_example_prints_what_is_shown() -> None:
-    (code,) = (text for kind, text in BLOCKS if kind == "python")
-    place = [text for _, text in BLOCKS].index(code)
+    (_, code), (_, shown) = BLOCK.findall(README)
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
         exec(compile(code, "README.md", "exec"), {})  # noqa: S102 - our own
-    assert printed.getvalue() == BLOCKS[place + 1][1]
+    assert printed.getvalue() == shown
 
 
 def test_commands_exist() -> None:
