@@ -47,7 +47,7 @@ def test_command_writes_files_and_prints_a_table(
     assert written == sorted(["study.nc", "study.svg", *more])
     shown = capsys.readouterr().out
     assert words in shown
-    assert "The samples state no numerical errors" in " ".join(shown.split())
+    assert "samples state no numerical errors" in " ".join(shown.split())
     if more:
         lines = (tmp_path / "out" / more[0]).read_text().splitlines()
         assert lines[0] == "output,parameter,first_order,first_order_interval,total,total_interval"

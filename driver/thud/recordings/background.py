@@ -15,7 +15,7 @@ from scipy.fft import next_fast_len
 from scipy.linalg import lapack, solve_triangular
 from scipy.ndimage import median_filter, uniform_filter1d
 
-from thud.base.immutable import Immutable
+from thud.base.immutable import Immutable, freeze
 from thud.base.note import Note
 from thud.level.levels import RECORDED_BAND
 from thud.recordings.drops import BACKGROUND_MARGIN, MAX_BACKGROUND, Quantization
@@ -160,7 +160,7 @@ class Background(Immutable):
         noise = np.diag(white + (QUANTIZATION * self.peak) ** 2)
         factor = np.linalg.cholesky(self.covariance(self.cells, self.cells) + noise)
         unit = np.eye(len(factor))
-        return np.asarray(solve_triangular(factor, unit, lower=True, check_finite=False))
+        return freeze(solve_triangular(factor, unit, lower=True, check_finite=False))
 
     def predict(self, cells: Cells) -> NDArray[np.float64]:
         """Return the expected background in cells, N."""

@@ -13,7 +13,7 @@ from scipy.signal import find_peaks, peak_widths
 from tqdm import tqdm
 
 from thud.base.checks import refuse
-from thud.base.immutable import Immutable
+from thud.base.immutable import Immutable, freeze
 from thud.base.note import Note
 from thud.level.estimate import Estimate
 
@@ -193,7 +193,7 @@ class Section(Stage):
     @cached_property
     def roughness(self) -> NDArray[np.float64]:
         """Deviation of each sample from a cubic through samples on both sides, N, shape (n,)."""
-        return np.convolve(np.pad(self.force, 3, mode="edge"), FROM_CUBIC, mode="valid")
+        return freeze(np.convolve(np.pad(self.force, 3, mode="edge"), FROM_CUBIC, mode="valid"))
 
     @property
     def noise(self) -> float:
