@@ -136,7 +136,8 @@ def save(
         CRITERIA: criteria_csv(data).encode(),
         JSON: json_bytes(data),
     }
-    if figures and (drawings := draw_figures(data.recording)):
+    if figures:
+        drawings = draw_figures(data.recording)
         contents |= page_contents(data, drawings, results.folder) | drawings
     if stages:
         from thud.plot.save_figures import figure_files
@@ -148,7 +149,7 @@ def save(
 def draw_figures(recording: Recording) -> dict[str, bytes]:
     """Return the figures of a recording as SVG, by file name; warn of those not drawn."""
     # A damaged matplotlib, which is slow to import, leaves levels and data as they are.
-    with warn_if_not_drawn(HTML):
+    with warn_if_not_drawn(f"the figures of {HTML}"):
         from thud.plot.save_figures import figure_files
 
         draws = draw_all({name: partial(recording.plot, kind=name) for name in FIGURES})
