@@ -40,8 +40,9 @@ def freeze(array: NDArray[Any]) -> NDArray[Any]:
 def _read_only(value: Any) -> Any:  # noqa: ANN401 - values of any kind
     if isinstance(value, np.ndarray) and value.flags.writeable:
         value = freeze(value.copy())
-    if type(value) in {list, tuple}:
-        return tuple(map(_read_only, value))
+    if isinstance(value, list | tuple):
+        entries = map(_read_only, value)
+        return value._make(entries) if hasattr(value, "_make") else tuple(entries)
     if type(value) is dict:
         return {key: _read_only(entry) for key, entry in value.items()}
     return value
