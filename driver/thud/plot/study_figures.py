@@ -254,6 +254,7 @@ def draw_surrogate(result: Surrogate, ax: Axes | None = None) -> Figure:
     names = [label.replace("floor ", "").replace("elastic ", "") for label in labels]
     axes.set_yticks(position, [name[0].upper() + name[1:] for name in names])
     axes.set_ylim(len(labels) - 0.5, -0.5)
+    axes.locator_params(axis="x", nbins=5)
     axes.set_xlabel("Surrogate − model, dB")
     return finish(axes, ax)
 
