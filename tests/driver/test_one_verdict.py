@@ -78,7 +78,7 @@ def test_fit_to_its_own_levels_finds_the_ball_again(force: LevelsForce) -> None:
     assert found.case.ball.youngs_modulus == pytest.approx(1.56e6, rel=1e-6)
     impact = thud.solve(found.case)
     assert found.result.peak() == impact.peak()
-    assert found.impact.levels().tolist() == impact.levels().tolist()
+    assert found.result.levels().tolist() == impact.levels().tolist()
 
 
 def test_fit_to_an_impact_compares_the_force_that_it_judges() -> None:

@@ -209,9 +209,7 @@ def _two_users(server: Explorer, chance: random.Random) -> str:
 def _work(server: Explorer) -> http.client.HTTPResponse:
     """Begin work that takes minutes; return its answer, whose end ends the connection."""
     with server.begin("/solve", json.dumps(LONG).encode()) as connection:
-        answer = http.client.HTTPResponse(connection)
-    answer.begin()
-    return answer
+        return http.client.HTTPResponse(connection)
 
 
 def _leave(server: Explorer, chance: random.Random) -> str:
@@ -235,6 +233,7 @@ def _leave(server: Explorer, chance: random.Random) -> str:
 def _kill_work(server: Explorer, chance: random.Random) -> str:
     with _work(server) as answer:
         _signal(server, signal.SIGKILL, chance)
+        answer.begin()
         content = answer.read()
     return "" if b"ended without an answer" in content else f"lost: {content[-300:]!r}"
 

@@ -103,7 +103,10 @@ def common_answer(
         },
         "criteria": [_criterion(criterion, verdict.source) for criterion in verdict.criteria],
         "result": RESULTS[verdict.conforms],
-        "limits": {"source": humanize(verdict.source), "standard": STANDARDS[verdict.source]},
+        "limits": {
+            "source": humanize(verdict.source),
+            "standard": STANDARDS.get(verdict.source, ""),
+        },
         "numbers": _numbers(source),
         "warnings": [],
     }

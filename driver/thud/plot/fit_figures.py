@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from thud.impact.impact import Impact
     from thud.studies.fitting.fit_result import Fit, FittedTarget
     from thud.studies.fitting.level_target import LevelComparison
 
@@ -77,8 +78,8 @@ def target_and_fit(fit: Fit, ax: Axes | None = None, number: int = 1) -> Figure:
 
 def _draw_force(fitted: FittedTarget, deviation: float, above: Axes, below: list[Axes]) -> None:
     """Draw record, fit with its background, and residual."""
-    comparison = cast("ForceComparison", fitted.comparison)
-    column = comparison.columns(fitted.result, fitted.own)
+    comparison, impact = cast("ForceComparison", fitted.comparison), cast("Impact", fitted.result)
+    column = comparison.columns(impact, fitted.own)
     time = 1e3 * column["time_s"]
     record, target = column["record_N"], column["target_N"]
     band = f"below {comparison.below / 1e3:.3g} kHz"
@@ -89,7 +90,7 @@ def _draw_force(fitted: FittedTarget, deviation: float, above: Axes, below: list
     )
     fit = column["model_N"] + column["background_N"]
     above.plot(time, fit / 1e3, color=COLORS[1], linestyle="--", linewidth=1.1, label="Fit")
-    contact, touch = fitted.result.contact_time, comparison.own_value(SHIFT, fitted.own)
+    contact, touch = impact.contact_time, comparison.own_value(SHIFT, fitted.own)
     begin, end = touch - BEFORE * contact, touch + (1 + AFTER) * contact
     above.set_xlim(
         1e3 * max(begin, comparison.record.time[0]), 1e3 * min(end, comparison.record.time[-1])
@@ -125,9 +126,9 @@ def _draw_press(fitted: FittedTarget, deviation: float, above: Axes, below: list
 
 def _draw_levels(fitted: FittedTarget, scale: float, above: Axes, below: list[Axes]) -> None:
     """Draw levels with their uncertainty times a scale, and the residuals of all quantities."""
-    comparison = cast("LevelComparison", fitted.comparison)
-    column = comparison.columns(fitted.result, fitted.own)
-    residuals = comparison.residual(fitted.result, fitted.own) / scale
+    comparison, impact = cast("LevelComparison", fitted.comparison), cast("Impact", fitted.result)
+    column = comparison.columns(impact, fitted.own)
+    residuals = comparison.residual(impact, fitted.own) / scale
     names = [str(name).removesuffix(" Hz") for name in column["quantity"]]
     x = np.arange(len(names))
     count = sum(str(name).endswith(" Hz") for name in column["quantity"])
@@ -139,7 +140,7 @@ def _draw_levels(fitted: FittedTarget, scale: float, above: Axes, below: list[Ax
     label = "Standard deviation of the target"
     tolerance_boxes(above, target - half, target + half, label, "Target")
     above.plot(x[:count], model, label="Fit", **curve_style(1, 4))
-    above.set_ylabel(level_label(FORCE_NAMES[fitted.result.assessed_force(comparison.force)]))
+    above.set_ylabel(level_label(FORCE_NAMES[impact.assessed_force(comparison.force)]))
     lowest = [above, *below][-1]
     lowest.set_xticks(x, [WRAPPED_NAMES.get(name, name) for name in names], fontsize="small")
     lowest.xaxis.set_minor_locator(NullLocator())

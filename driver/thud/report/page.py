@@ -95,7 +95,7 @@ def report_page(
         rows=[(e.criterion.conforms, criterion_row(e), range_picture(e)) for e in criteria],
         limits_x=LIMITS_X,
         excluded=excluded_text(criteria),
-        standards=STANDARDS[data.verdict.source],
+        standards=STANDARDS.get(data.verdict.source, "the standards"),
         has_own_limits=any(entry.has_own_limits for entry in criteria),
         figures=[*figures],
         drops=drop_table(data.recording),

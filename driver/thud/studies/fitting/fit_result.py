@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
     from thud.base.note import Note
     from thud.case.case import Case
+    from thud.impact.compression import CompressionCurve
+    from thud.impact.impact import Impact
     from thud.studies.arrays import Array
     from thud.studies.fitting.comparison import Comparison
 
@@ -47,7 +49,7 @@ class FittedTarget(Immutable):
     """
 
     case: Case
-    result: Any
+    result: Impact | CompressionCurve
     comparison: Comparison[Any]
     own: Array
 
@@ -151,7 +153,7 @@ class Fit(Displayed):
         return self.targets[0].case
 
     @property
-    def result(self) -> Any:  # noqa: ANN401 - that of the target
+    def result(self) -> Impact | CompressionCurve:
         """The impact, or curve of a press, of the first target."""
         return self.targets[0].result
 
