@@ -62,7 +62,7 @@ def answer_recording(paths: Sequence[str], table: Mapping[str, Any]) -> dict[str
 def calibration_report(paths: Sequence[str], table: Mapping[str, Any]) -> str:
     """Return the page with the calibration report of recorded drops, as `answer_recording`."""
     recording = read_copies(paths, table)
-    return report_page(report_data(recording), draw_figures(recording).values())
+    return report_page(report_data(recording), (draw_figures(recording) or {}).values())
 
 
 def read_copies(paths: Sequence[str], table: Mapping[str, Any]) -> Recording:

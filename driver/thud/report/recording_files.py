@@ -136,8 +136,7 @@ def save(
         CRITERIA: criteria_csv(data).encode(),
         JSON: json_bytes(data),
     }
-    if figures:
-        drawings = draw_figures(data.recording)
+    if figures and (drawings := draw_figures(data.recording)) is not None:
         contents |= page_contents(data, drawings, results.folder) | drawings
     if stages:
         from thud.plot.save_figures import figure_files
@@ -146,15 +145,18 @@ def save(
     return results.write(contents)
 
 
-def draw_figures(recording: Recording) -> dict[str, bytes]:
-    """Return the figures of a recording as SVG, by file name; warn of those not drawn."""
+def draw_figures(recording: Recording) -> dict[str, bytes] | None:
+    """Return the figures of a recording as SVG, by file name; warn of those not drawn.
+
+    None if matplotlib cannot be imported, without which there is no page.
+    """
     # A damaged matplotlib, which is slow to import, leaves levels and data as they are.
-    with warn_if_not_drawn(f"the figures of {HTML}"):
+    with warn_if_not_drawn(HTML):
         from thud.plot.save_figures import figure_files
 
         draws = draw_all({name: partial(recording.plot, kind=name) for name in FIGURES})
         return figure_files(draws)
-    return {}
+    return None
 
 
 def page_contents(data: ReportData, drawings: dict[str, bytes], folder: Path) -> dict[str, bytes]:
