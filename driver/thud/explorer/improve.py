@@ -91,8 +91,8 @@ def _conforming(case: Case, name: str) -> float | None:
 
 def _improved(case: Case, name: str) -> list[Answer]:
     """Return the smallest change of a layer that meets the requirement, if there is one."""
-    needed = {name, "screed_thickness"} if name == STIFFNESS else {name}
-    if not all(getattr(case.floor, layer, 0.0) for layer in needed):
+    floor = case.floor
+    if floor is None or not getattr(floor, name, 0.0) or not floor.keys[name].has_effect(floor):
         return []
     factors = 0.9**LAYER_STEPS
     if name != STIFFNESS:

@@ -47,11 +47,11 @@ _THICKNESSES = {
     "joist_height": "joists",
     "layer_thickness": "top lamella",
 }
-# Changed key of a floor by the words for its change: its factor, and the plate that it belongs to.
+# Changed key of a floor by the words for its change, and its factor.
 _FACTORS = {
-    "stiffness of the resilient layer halved": ("layer_stiffness", 0.5, "screed_thickness"),
-    "stiffness of the channels halved": ("channel_stiffness", 0.5, "subceiling_thickness"),
-    "mass of the subceiling doubled": ("subceiling_density", 2.0, "subceiling_thickness"),
+    "stiffness of the resilient layer halved": ("layer_stiffness", 0.5),
+    "stiffness of the channels halved": ("channel_stiffness", 0.5),
+    "mass of the subceiling doubled": ("subceiling_density", 2.0),
 }
 # Maximum number of values of a key that are listed.
 _MAX_SHOWN = 12
@@ -320,8 +320,8 @@ def _variants(
                 (value[0] + _ADDED, *value[1:]) if isinstance(value, tuple) else value + _ADDED
             )
             yield f"{title} +{1e3 * _ADDED:g} mm", {key: changed}, {}
-    for text, (key, factor, plate) in _FACTORS.items():
-        if getattr(floor, plate, 0.0):
+    for text, (key, factor) in _FACTORS.items():
+        if key in floor.keys and floor.keys[key].has_effect(floor):
             yield text, {key: factor * getattr(floor, key)}, {}
     if room.ceiling_mass:
         yield "mass of the ceiling doubled", {}, {"ceiling_mass": 2 * room.ceiling_mass}
