@@ -12,13 +12,12 @@ module thud_api
    use thud_interrupt, only: begin_call, end_call, interrupt_calls
    use thud_kinds, only: int64, int8, wp
    use thud_memory, only: require_memory
-   use thud_progress, only: latest_progress
    use thud_request, only: request_type
    use thud_text, only: to_text
    implicit none (type, external)
    private
 
-   public :: ask, collect, end_calls, get_progress
+   public :: ask, collect, end_calls
 
    !> Memory for each number of a request, bytes: up to 8.5 copies for levels, low-pass and peaks (measured), twice as many
    !> if the length is padded to the next power of two. Requests with fewer numbers than `few_numbers` are not checked.
@@ -79,13 +78,5 @@ contains
 
       call interrupt_calls()
    end subroutine end_calls
-
-   !> Progress of the latest long work of this process.
-   subroutine get_progress(done)
-      !> Fraction done, 0 to 1.
-      real(wp), intent(out) :: done
-
-      done = latest_progress
-   end subroutine get_progress
 
 end module thud_api

@@ -5,7 +5,7 @@ module thud_progress
    implicit none (type, external)
    private
 
-   public :: latest_progress, report_progress, show_progress
+   public :: report_progress, show_progress
 
    abstract interface
       !> Shows the progress.
@@ -19,9 +19,6 @@ module thud_progress
          character(len=*), intent(in) :: unit
       end subroutine handler
    end interface
-
-   !> Fraction done at the latest report of this process, 0 to 1; other threads may read it.
-   real(wp), volatile, protected :: latest_progress = 0.0_wp
 
    !> Procedure that shows the progress; null unless the executable or the driver sets it.
    procedure(handler), pointer :: show_progress => null()
@@ -39,8 +36,6 @@ contains
 
       ! Of drops that are computed in parallel one reports.
       !$ if (omp_get_thread_num() > 0) return
-      latest_progress = 0.0_wp
-      if (whole > 0.0_wp) latest_progress = min(1.0_wp, done/whole)
       ! Another thread may change it meanwhile.
       current => show_progress
       if (associated(current)) call current(done, whole, unit)

@@ -21,7 +21,7 @@ module thud_interrupt
    end interface
 
    !> Marks the beginning of a call of the library: until its end, SIGINT and SIGTERM also set `latest_signal` if the process
-   !> handles them. All calls from Python begin with it except `collect`, `get_progress` and `end_calls`.
+   !> handles them. All calls from Python begin with it except `collect` and `end_calls`.
    procedure(plain_call), bind(c, name='thud_begin_call') :: begin_call
    !> Marks the end of a call.
    procedure(plain_call), bind(c, name='thud_end_call') :: end_call

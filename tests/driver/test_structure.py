@@ -131,7 +131,7 @@ def test_every_call_of_python_is_guarded() -> None:
         if early or ends != ("call begin_call()", "call end_call()"):
             unguarded.add(name)
     # One asks another, the others compute nothing.
-    assert unguarded == {"collect", "end_calls", "get_progress"}
+    assert unguarded == {"collect", "end_calls"}
 
 
 def test_fortran_names_no_figures_of_the_driver() -> None:

@@ -122,8 +122,3 @@ def version() -> str:
 def compiler() -> str:
     """Return the compiler of the library and its options, except options with paths."""
     return re.sub(r" (-[IJ] ?)?\S*/\S*", "", ask("library")["compiler"])
-
-
-def progress() -> float:
-    """Return the completed fraction, 0 to 1, of the latest long computation of this process."""
-    return float(api.get_progress())
