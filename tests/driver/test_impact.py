@@ -80,43 +80,13 @@ def test_interpreters_without_a_lock_stay_so() -> None:
     assert done.stdout.strip() == str(has_lock), done.stderr
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ({"model": "cube"}, naming("&model: name", "'cube'", "'hollow_sphere'")),
-        ({"damping_law": "some"}, naming("&modal_ball: damping_law", "'some'", "'rising'")),
-        ({"stiffness": 1.0}, naming("'stiffness'", "hunt_crossley", "oscillator")),
-        ({"sample_rate": 0.0}, naming("&sampling: sample_rate", 0.0, 2000)),
-        ({"duration": 0.01}, naming("&sampling: duration", "0.01 s")),
-        ({"substeps": 0}, naming("&sampling: substeps", 0, 1, 10000)),
-        ({"ball": 1}, naming("ball", "int", "Ball")),
-        ({"ball": {}}, naming("ball", "dict", "Ball")),
-        ({"drop": 0.0}, naming("drop", "float", "Drop")),
-        (
-            {"ball": thud.Ball(youngs_modulus=7e10), "substeps": 64, "model": "hollow_sphere"},
-            naming("&sampling: sample_rate", "44100.0 Hz", "74657.91175803845 Hz"),
-        ),
-    ],
-)
-def test_bad_arguments_are_told(arguments: dict[str, object], words: str) -> None:
-    with pytest.raises((thud.InputError, TypeError), match=words):
-        thud.solve(**arguments)  # type: ignore[arg-type]
-
-
 def test_numerical_failures_are_told() -> None:
-    with pytest.raises(thud.NumericalError, match=naming("&drop: height", "1000.0 m", "114.00 mm")):
-        thud.solve(drop=thud.Drop(1000.0), model="hollow_sphere")
     with pytest.raises(thud.NumericalError, match=naming("&sampling: substeps")) as told:
         thud.solve(
             drop=thud.Drop(1e6, 1000.0), model="hunt_crossley", stiffness=1e15, exponent=5.0,
             restitution=0.5,
         )  # fmt: skip
     assert "Infinity" not in str(told.value)
-
-
-def test_unknown_force_is_told() -> None:
-    with pytest.raises(thud.InputError, match=naming("'total'", "'elastic'", "'floor'")):
-        thud.solve(model="hollow_sphere").levels(force="total")
 
 
 def test_each_question_is_answered_for_the_force_that_is_asked() -> None:
@@ -165,8 +135,6 @@ def test_arguments_of_a_drop_are_keys_of_its_case() -> None:
     assert (found.floor_force == default.floor_force).all()
     with pytest.raises(thud.InputError, match=naming("&model")):
         thud.solve(replace(more, model=None))
-    with pytest.raises(thud.InputError, match=naming("&model: name", "''", "'hollow_sphere'")):
-        thud.solve(model="")  # type: ignore[call-overload]
     for given in ({"drop": drop}, {"model": "hollow_sphere"}, {"duration": 0.05}, {"rings": 9}):
         with pytest.raises(thud.InputError, match=naming("solve(case)")):
             thud.solve(more, **given)  # type: ignore[call-overload]
