@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from math import inf, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 import thud
+from thud.level.levels import peak_count
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
+
+# What is only imported for the table.
+__all__ = ["inf", "nan", "np", "peak_count"]
 
 PULSE = np.sin(np.pi * np.linspace(0, 1, 883))
 
