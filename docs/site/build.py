@@ -14,9 +14,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-import thud
 from PIL import Image
 
+from examples import read_examples
 from fortran import write_pages
 
 REPOSITORY = Path(__file__).parents[2]
@@ -28,16 +28,12 @@ COPIED = (
 
 
 def python_page() -> str:
-    """Return the page of all public Python names, classes first."""
-    kinds = {"Classes": [], "Functions": []}
-    for name in sorted(thud.__all__):
-        found = getattr(thud, name)
-        if isinstance(found, type):
-            kinds["Classes"].append(name)
-        elif callable(found):
-            kinds["Functions"].append(name)
-    text = "# Python reference\n\nAll public names of the package `thud`.\n"
-    for title, names in kinds.items():
+    """Return the page of all public Python names, by the tasks of their examples."""
+    tasks: dict[str, list[str]] = {}
+    for example in read_examples():
+        tasks.setdefault(example.task, []).extend(example.names)
+    text = "# Python reference\n\nThe public names of the package `thud`, by task.\n"
+    for title, names in tasks.items():
         listed = "\n".join(f"   {name}" for name in names)
         text += (
             f"\n## {title}\n\n```{{eval-rst}}\n.. currentmodule:: thud\n\n"
@@ -59,6 +55,9 @@ def copy_sources() -> Path:
             shutil.copy(path, source)
     for name in ("conf.py", "index.md", "gallery.md"):
         shutil.copy(Path(__file__).parent / name, source)
+    # The search of the guide finds pages on how things are, not how they became.
+    log = source / "CHANGELOG.md"
+    log.write_text(f"---\nnosearch: true\n---\n\n{log.read_text('utf-8')}", "utf-8")
     # Tutorials find the inputs beside them, as `thud-driver examples` puts them.
     (source / "docs/tutorials/inputs").symlink_to(source / "inputs")
     return source

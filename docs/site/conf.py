@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+import inspect
 import re
-from inspect import signature
+import sys
+import textwrap
+from abc import ABCMeta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from docutils import nodes
 from latex2mathml.converter import convert
 from matplotlib.image import imread
+from numpydoc.docscrape import NumpyDocString
+from numpydoc.xref import DEFAULT_LINKS
 from sphinx.util.inspect import stringify_signature
 
 import thud
+
+# The directory of this file, of which the site has a copy.
+sys.path.append("docs/site")
+from examples import read_examples
 
 if TYPE_CHECKING:
     from sphinx.application import Sphinx
@@ -54,12 +63,42 @@ nb_merge_streams = True
 autodoc_typehints = "none"  # the sections of parameters say more
 autosummary_generate = True
 numpydoc_show_class_members = False
+# Names in types and "See also" are links, and words in single quotes that are names, too.
+default_role = "py:obj"
+numpydoc_xref_param_type = True
+numpydoc_xref_ignore = {"of", "or", "shape", "pair", "to", "type", "subclass"}
+numpydoc_xref_aliases = {word: word for word in DEFAULT_LINKS}  # else of inventories
+# Where names of other projects are described: links that need no inventory from the network.
+PYTHON, NUMPY = "https://docs.python.org/3", "https://numpy.org/doc/stable/reference"
+MATPLOTLIB, XARRAY = "https://matplotlib.org/stable/api", "https://docs.xarray.dev/en/stable"
+EXTERNAL = {
+    **{
+        name: f"{PYTHON}/library/functions.html#{name}"
+        for name in ("bool", "callable", "dict", "float", "int", "list", "object", "str", "tuple")
+    },
+    **{name: f"{PYTHON}/library/constants.html#{name}" for name in ("None", "True", "False")},
+    **{name: f"{PYTHON}/glossary.html#term-{name}" for name in ("iterable", "mapping", "sequence")},
+    "path-like": f"{PYTHON}/glossary.html#term-path-like-object",
+    "Path": f"{PYTHON}/library/pathlib.html#pathlib.Path",
+    "OSError": f"{PYTHON}/library/exceptions.html#OSError",
+    "ndarray": f"{NUMPY}/generated/numpy.ndarray.html",
+    "array_like": f"{NUMPY}/typing.html#numpy.typing.ArrayLike",
+    "DataFrame": "https://pandas.pydata.org/docs/reference/api/pandas.DataFrame.html",
+    "Dataset": f"{XARRAY}/generated/xarray.Dataset.html",
+    "Axes": f"{MATPLOTLIB}/_as_gen/matplotlib.axes.Axes.html",
+    "Figure": f"{MATPLOTLIB}/_as_gen/matplotlib.figure.Figure.html",
+}
 add_module_names = False
 
 highlight_language = "none"  # blocks without a language are what programs print
 
 html_math_renderer = "mathml"
 html_theme = "furo"
+html_favicon = "docs/site/static/favicon.svg"
+myst_html_meta = {
+    "description": "thud: the force of the rubber ball, the tyre and other heavy/soft impact"
+    " sources on floors, and the level in the room below"
+}
 html_copy_source = False
 html_title = f"thud {release}"
 html_static_path = ["docs/site/static"]
@@ -69,6 +108,7 @@ html_theme_options = {
 }
 TUTORIALS = "docs/tutorials/"
 NAVIGATION: dict[str, str] = {}
+EXAMPLES = {name: example for example in read_examples() for name in example.names}
 # Width of a column of a journal, inch, and pixels of the screen for an inch of a figure.
 COLUMN, DENSITY = 3.5, 150
 
@@ -91,10 +131,43 @@ def scale_figures(app: Sphinx, document: nodes.document) -> None:
 def show_signature(
     _: Sphinx, what: str, _name: str, item: object, *_rest: object
 ) -> tuple[str, str] | None:
-    """Return the signature of a class with its own arguments: they are checked by a wrapper."""
+    """Return the signature of a class with its own arguments: they are checked by a wrapper.
+
+    Results have none: functions make them.
+    """
+    if what == "class" and isinstance(item, ABCMeta):
+        return "", ""
     if what == "class":
-        return stringify_signature(signature(item), show_annotation=False), ""
+        return stringify_signature(inspect.signature(item), show_annotation=False), ""
     return None
+
+
+def show_example(
+    _: Sphinx, what: str, name: str, item: object, _options: object, lines: list[str]
+) -> None:
+    """Add to the text of a public name its example, and to a class what its base classes hold."""
+    example = EXAMPLES.get(name.removeprefix("thud."))
+    if what not in {"class", "function", "data", "exception"} or not example:
+        return
+    for base in getattr(item, "__mro__", ())[1:]:
+        if base.__module__.startswith("thud.") and base.__name__ not in thud.__all__:
+            shown = NumpyDocString(inspect.getdoc(base) or "")["Attributes"]
+            begin = lines.index("Attributes") + 2 if shown and "Attributes" in lines else 0
+            for entry in shown if begin else ():
+                text = [f"{entry.name} : {entry.type}", *(f"    {line}" for line in entry.desc)]
+                lines[begin:begin] = text
+                begin += len(text)
+    if "Examples" not in lines:
+        code = textwrap.indent(example.code, "    ").splitlines()
+        lines += ["", "Examples", "--------", ".. code-block:: python", "", *code, ""]
+
+
+def link_other_projects(
+    _: Sphinx, _environment: BuildEnvironment, node: nodes.Element, shown: nodes.TextElement
+) -> nodes.reference | None:
+    """Return the link of a name that another project describes."""
+    address = EXTERNAL.get(node["reftarget"])
+    return nodes.reference("", "", shown, internal=False, refuri=address) if address else None
 
 
 def keep_punctuation(_: Sphinx, document: nodes.document) -> None:
@@ -183,7 +256,9 @@ def setup(app: Sphinx) -> None:
     """Write formulas as MathML; scale figures and join punctuation when a page was read."""
     app.connect("html-page-context", shorten_navigation, priority=400)  # before the theme
     app.add_html_math_renderer("mathml", (write_mathml, None), (write_mathml, None))
+    app.connect("autodoc-process-docstring", show_example, priority=400)  # before numpydoc
     app.connect("autodoc-process-signature", show_signature)
+    app.connect("missing-reference", link_other_projects)
     app.connect("env-before-read-docs", spread_tutorials)
     app.connect("doctree-read", scale_figures)
     app.connect("doctree-read", keep_punctuation)

@@ -25,10 +25,30 @@ REPLACED = {
     r"(?m)^ *include .*": "",
 }
 FACADE = "thud"
-REFERENCE = """# Fortran reference
+FRONT = "---\ntocdepth: 2\nnosearch: true\n---"
+REFERENCE = """---
+nosearch: true
+---
+
+# Fortran reference
 
 The modules of the library, a page for each folder of the sources. Programs use the façade
 `thud`, which makes names of other modules public ([thud in Fortran programs](../docs/fortran.md)).
+
+"""
+NAMES = """
+## Names
+
+```{raw} html
+<label>Find a name: <input type="search" id="find"></label>
+<script>
+  document.getElementById("find").addEventListener("input", (event) => {
+    const word = event.target.value.trim().toLowerCase();
+    for (const entry of document.querySelectorAll("#names li"))
+      entry.hidden = !entry.textContent.includes(word);
+  });
+</script>
+```
 
 """
 
@@ -167,10 +187,19 @@ def write_pages(sources: Path, copy: Path, target: Path) -> None:
     for folder, members in sorted(folders.items()):
         sections = [section for module in members for section in pages.module(module)]
         # The list of sections beside the page holds those of modules only.
-        text = "\n".join(["---\ntocdepth: 2\n---\n", heading(1, f"src/{folder}"), *sections])
+        text = "\n".join(
+            ["---\ntocdepth: 2\nnosearch: true\n---\n", heading(1, f"src/{folder}"), *sections]
+        )
         (target / f"{folder.replace('/', '_')}.md").write_text(text, encoding="utf-8")
         names = ", ".join(f"[`{module.name}`](#{module.name})" for module in members)
         listed.append(entry(f"[src/{folder}]({folder.replace('/', '_')}.md)", names))
     toctree = ["```{toctree}", ":hidden:", ":glob:", "", "*", "```", ""]
-    text = "\n".join([REFERENCE, *listed, "", *list_facade(facade), "", *toctree])
+    public = [
+        item
+        for module in modules
+        for item in [*module.types, *module.functions, *module.subroutines, *module.interfaces]
+        if module is not facade
+    ]
+    names = [entry(f"{link(item)} of `{item.parent.name}`", "") for item in in_order(public)]
+    text = "\n".join([REFERENCE, *listed, "", *list_facade(facade), NAMES, *names, "", *toctree])
     (target / "index.md").write_text(text, encoding="utf-8")

@@ -1,19 +1,20 @@
-"""The inputs that the package brings."""
+"""The inputs that the package brings, and the examples of its public names."""
 
 from __future__ import annotations
 
+import os
 import shutil
-from typing import TYPE_CHECKING
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from conftest import REPOSITORY, names_in
+import pytest
+from conftest import REPOSITORY, load_script, names_in
 
 import thud
 from thud import cli
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pytest
     from conftest import ErrorsOf
 
 
@@ -44,3 +45,27 @@ def test_examples_replace_nothing(tmp_path: Path, errors_of: ErrorsOf) -> None:
     (tmp_path / "kept").write_text("mine")
     assert str(tmp_path) in errors_of("examples", tmp_path)
     assert names_in(tmp_path) == ["kept"]
+
+
+EXAMPLES = load_script("docs/site/examples.py").read_examples()
+
+
+def test_each_public_name_has_one_example() -> None:
+    shown = [name for example in EXAMPLES for name in example.names]
+    modules = {"plot", "recordings"}
+    assert sorted(shown) == sorted(set(thud.__all__) - modules)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda example: example.names[0])
+def test_examples_run(
+    example: Any,  # noqa: ANN401 - of a script
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    executable: str,
+) -> None:
+    (tmp_path / "inputs").symlink_to(REPOSITORY / "inputs")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PATH", str(Path(executable).parent), prepend=os.pathsep)
+    with warnings.catch_warnings():
+        exec(example.code, {})  # noqa: S102 - our own

@@ -1,0 +1,19 @@
+"""Errors and warnings."""
+
+import warnings
+
+import thud
+
+# %% ThudError, InputError, NumericalError
+try:
+    thud.solve(thud.Ball(mass=-1.0))
+except thud.ThudError as error:
+    print(type(error).__name__, error.note.subject, error.note.low, error.note.high)
+
+# %% PlausibilityWarning
+with warnings.catch_warnings(record=True, action="always") as caught:
+    thud.solve(thud.Ball(mass=7.0, wall_thickness=0.02))
+print([str(warning.message) for warning in caught])
+
+# %% FitWarning
+warnings.simplefilter("error", thud.FitWarning)
