@@ -22,16 +22,16 @@ from thud.base._schema import (
 )
 from thud.case.case import Case
 from thud.floors.impedance import ball_impedance
-from thud.floors.mobility import mobility
 from thud.impact.compression import compress
 from thud.impact.ensemble import solve_many
 from thud.impact.free_modes import free_modes, loss_factors
 from thud.impact.solve import solve
 from thud.plot.ball_figures import compression, mode_shapes, motion
-from thud.plot.floor_figures import ball_impedances, draw_floor
+from thud.plot.floor_figures import ball_impedances, band_mobility, draw_floor
 from thud.plot.impact_figures import force_history, levels
 from thud.plot.style import (
     COLORS,
+    FORCE_NAMES,
     WIDTH,
     add_curves,
     add_levels,
@@ -52,6 +52,7 @@ if TYPE_CHECKING:
         FiniteElementViscosity,
         FloorOptions,
         HollowSphereMomentumFlux,
+        LevelsForce,
         ModelName,
     )
     from thud.impact.floor_impact import FloorImpact
@@ -116,16 +117,30 @@ def _draw_tires() -> Figure:
     return levels(impacts, source="tyre")
 
 
+def _draw_changes(impacts: dict[str, Impact], reference: Impact, force: LevelsForce) -> Figure:
+    """Draw differences of the levels of a force from those of another impact."""
+    figure, axes = empty_axes(2.6)
+    axes.axhline(0, color="0.45", linewidth=0.8)
+    nominal = reference.levels(force=force)
+    add_levels(axes, {name: i.levels(force=force) - nominal for name, i in impacts.items()})
+    axes.set_ylabel(level_label(FORCE_NAMES[force], "Change of the level, dB"))
+    legend_above(axes)
+    return figure
+
+
+@own_style()
 def _draw_fluxes() -> Figure:
-    """Draw the interpretations of the flux term of the paper."""
+    """Draw what the interpretations of the flux term of the paper change."""
     choices: tuple[HollowSphereMomentumFlux, ...] = (
-        "momentum_balance", "retarding", "conservative", "none",
-    )  # fmt: skip
+        "momentum_balance",
+        "retarding",
+        "conservative",
+    )
     impacts = {
         choice.replace("_", " "): solve(model="hollow_sphere", momentum_flux=choice)
         for choice in choices
     }
-    return levels(impacts, "elastic")
+    return _draw_changes(impacts, solve(model="hollow_sphere", momentum_flux="none"), "elastic")
 
 
 @own_style()
@@ -137,13 +152,7 @@ def _draw_families() -> Figure:
         name: solve(model="modal_ball", static_families=families)
         for name, families in static.items()
     }
-    reference = solve().levels()
-    figure, axes = empty_axes(2.8)
-    axes.axhline(0, color="0.45", linewidth=0.8)
-    add_levels(axes, {name: impact.levels() - reference for name, impact in impacts.items()})
-    axes.set_ylabel(level_label("force on the floor", "Change of the level, dB"))
-    legend_above(axes)
-    return figure
+    return _draw_changes(impacts, solve(), "floor")
 
 
 @own_style()
@@ -188,30 +197,33 @@ def _draw_floors() -> Figure:
     concrete = Plate(source_x=0.4, source_y=0.35)
     timber = replace(concrete, edges="absorption")
     floors: dict[str, FloorOptions] = {
-        "180 mm of concrete": concrete,
-        "screed on a soft layer on it": replace(
+        "concrete, 180 mm": concrete,
+        "screed on it": replace(
             concrete, screed_thickness=0.05, screed_loss_factor=0.02,
             layer_stiffness=8e6, layer_loss_factor=0.15,
         ),
-        "160 mm of cross-laminated timber": LaminateFloor(source_x=0.4, source_y=0.35),
-        "timber joists, between two": JoistFloor(
+        "CLT, 160 mm": LaminateFloor(source_x=0.4, source_y=0.35),
+        "timber joists": JoistFloor(
             sheathing_modulus=3.1e9, source_x=0.4, source_y=0.35
         ),
-        "22 mm of chipboard": replace(
+        "chipboard, 22 mm": replace(
             timber, length=2.4, width=1.8, thickness=0.022, density=650, wave_speed=2200,
             loss_factor=0.02,
         ),
     }  # fmt: skip
     figure, axes = empty_axes(2.8)
-    frequency = np.geomspace(11.0, 1400.0, 1500)
+    bands = np.geomspace(12.5, 1250, 21)
+    # Where the lines leave room, Hz and m/(N s).
+    places = ((90, 6e-7), (160, 1.5e-5), (60, 1.0e-4), (200, 2.6e-3), (12.5, 4.5e-3))
     for i, (name, floor) in enumerate(floors.items()):
-        # Resonances are as narrow as dashes: markers distinguish the curves instead.
-        style = curve_style(i, 4.5) | {"linestyle": "-", "linewidth": 0.8}
-        values = np.abs(mobility(floor, frequency).values)
-        axes.loglog(frequency, values, label=name, markevery=(30 * i, 225), **style)
+        y = band_mobility(floor, bands)
+        style = curve_style(i)
+        axes.loglog(bands, y, **style)
+        axes.text(*places[i], name, color=style["color"])
+    axes.set_ylim(3e-7, 1e-2)
     frequency_axis(axes)
+    axes.set_xlabel("One-third-octave band, Hz")
     axes.set_ylabel("Mobility, m/(N s)")
-    legend_above(axes)
     return figure
 
 

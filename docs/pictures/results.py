@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import thud
-from thud.plot import plate_modes
+from thud.plot import floor_steps, plate_modes
 from thud.plot.fit_figures import confidence
 from thud.studies.fit import run_fit
 
@@ -55,10 +55,11 @@ def floating_floor() -> Figure:
     return thud.predict_level(floor="concrete 210, Korean apartment floor", room=room).plot()
 
 
-def floors() -> Figure:
-    """Draw three slabs."""
-    paths = [INPUTS / f"floors/concrete_{thickness}.nml" for thickness in (140, 180, 220)]
-    return thud.compare_floors({path.stem: thud.read_case(path) for path in paths}).plot()
+@cache
+def floors() -> thud.FloorComparison:
+    """Return the comparison of three slabs."""
+    paths = {f"concrete, {mm} mm": INPUTS / f"floors/concrete_{mm}.nml" for mm in (140, 180, 220)}
+    return thud.compare_floors({name: thud.read_case(path) for name, path in paths.items()})
 
 
 def validation_figures() -> dict[str, Callable[[], Figure]]:
@@ -77,7 +78,8 @@ RESULTS: dict[str, Callable[[], Figure]] = {
     "fit_recording": lambda: study("fit", "fit_recording").plot(),
     "fit_recording_constant_loss": lambda: study("fit", "fit_recording_constant_loss").plot(),
     "floor_modes": lambda: plate_modes(prediction().floor),
-    "floors": floors,
+    "floors": lambda: floors().plot(),
+    "floors_steps": lambda: floor_steps(floors()),
     "law_of_loss": lambda: study("sweep", "law_of_loss").plot(),
     "modal_room": lambda: thud.modal_room(prediction()).plot(),
     "room_levels": lambda: thud.read_room_levels(

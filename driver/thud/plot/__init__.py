@@ -29,6 +29,7 @@ from thud.plot.ball_figures import (
 )
 from thud.plot.floor_figures import ball_impedances as ball_impedances, plate_modes as plate_modes
 from thud.plot.impact_figures import force_history as force_history, levels as levels
+from thud.plot.pages import floor_steps as floor_steps
 from thud.plot.recording_figures import (
     recording_forces as recording_forces,
     recording_levels as recording_levels,

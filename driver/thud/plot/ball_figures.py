@@ -10,7 +10,6 @@ import numpy as np
 from matplotlib.animation import FuncAnimation, PillowWriter
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
-from matplotlib.patheffects import withStroke
 
 from thud.base.checks import refuse, require_kind, require_mapping
 from thud.base.files import replace_file, require_ending
@@ -22,7 +21,6 @@ from thud.plot.style import (
     add_colorbar,
     add_curves,
     empty_axes,
-    figure_of,
     finish,
     own_or,
     own_style,
@@ -35,7 +33,6 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.quiver import Quiver
     from numpy.typing import NDArray
 
     from thud.impact.motion import Motion
@@ -43,8 +40,6 @@ if TYPE_CHECKING:
 # Instants of the paper's figure 5, and panels side by side.
 INSTANTS = 9
 COLUMNS = 3
-# Nodes between two arrows, from pole to pole and through the wall.
-ARROWS = (6, 4)
 FRAMES_PER_SECOND = 12
 DISPLACEMENT = "Displacement, mm"
 # Maximum displacement of a mode in its figure, as a fraction of the radius.
@@ -66,8 +61,8 @@ def _draw_section(
 def motion(impact: Impact) -> Figure:
     """Draw nine instants of the impact, from first touch to release (paper, figure 5).
 
-    Half sections above the floor show the displacement since first touch, mm, by color and the
-    velocity by arrows. Raise InputError if the impact has no snapshots.
+    Half sections above the floor show the displacement since first touch, mm, by color. Raise
+    InputError if the impact has no snapshots.
     """
     snapshots = _snapshots(impact)
     times = impact.touch_time + np.linspace(0, impact.contact_time, INSTANTS)
@@ -77,9 +72,8 @@ def motion(impact: Impact) -> Figure:
     scale = _scale(snapshots, chosen)
     depth = snapshots.floor_displacement[chosen].max()
     for axes, i in zip(panels, chosen, strict=True):
-        arrows = _draw_instant(axes, impact, i, scale, depth)
+        _draw_instant(axes, impact, i, scale, depth)
     add_colorbar(figure, panels, ScalarMappable(scale), DISPLACEMENT)
-    _add_key(panels[0], arrows, impact)
     return figure
 
 
@@ -100,7 +94,7 @@ def animate(impact: Impact, path: str | os.PathLike[str]) -> None:
     def draw(i: int) -> list[Any]:
         axes.clear()
         depth = snapshots.floor_displacement.max()
-        _add_key(axes, _draw_instant(axes, impact, i, scale, depth), impact)
+        _draw_instant(axes, impact, i, scale, depth)
         return []
 
     animation = FuncAnimation(figure, draw, frames=count, blit=False)
@@ -130,26 +124,13 @@ def _displacement(snapshots: Motion, i: int) -> NDArray[np.float64]:
     return distance
 
 
-def _draw_instant(axes: Axes, impact: Impact, i: int, scale: Normalize, depth: float) -> Quiver:
-    """Draw the ball, its velocities and the floor, down to a depth, m; return the arrows."""
+def _draw_instant(axes: Axes, impact: Impact, i: int, scale: Normalize, depth: float) -> None:
+    """Draw the ball and the floor, down to a depth, m."""
     radius = impact.case.ball.outer_radius
     snapshots = _snapshots(impact)
     position = snapshots.position[i]
     floor = -snapshots.floor_displacement[i]
     _draw_section(axes, position, 1e3 * _displacement(snapshots, i), scale)
-    shown_nodes = (slice(None, None, ARROWS[0]), slice(None, None, ARROWS[1]))
-    start, velocity = (
-        field[shown_nodes].reshape(-1, 2) for field in (position, snapshots.velocity[i])
-    )
-    # At first touch an arrow is as long as a third of the radius.
-    velocity_scale = 3 * impact.impact_velocity / radius
-    above_floor = start[:, 1] + velocity[:, 1] / velocity_scale >= floor
-    arrows = axes.quiver(
-        *start[above_floor].T, *velocity[above_floor].T, angles="xy", scale_units="xy",
-        scale=velocity_scale, width=0.014, color="0.1",
-        # A light edge shows arrows on dark colors.
-        path_effects=[withStroke(linewidth=1, foreground="white")],
-    )  # fmt: skip
     lowest = -depth - 0.12 * radius
     axes.fill_between([-0.05 * radius, 1.4 * radius], lowest, floor, color="0.6", linewidth=0)
     elapsed = 1e3 * (snapshots.time[i] - impact.touch_time)
@@ -159,18 +140,6 @@ def _draw_instant(axes: Axes, impact: Impact, i: int, scale: Normalize, depth: f
     axes.set_ylim(lowest - 0.03 * radius, 2.4 * radius)
     axes.set_aspect("equal")
     axes.set_axis_off()
-    return arrows
-
-
-def _add_key(axes: Axes, arrows: Quiver, impact: Impact) -> None:
-    """Show the size of a round velocity beside the label of the colors."""
-    velocity = float(f"{impact.impact_velocity:.1g}")
-    # In fractions of the figure: a key in inches would be lost if a notebook crops the figure.
-    x, y = (WIDTH - 0.52, 0.11) / figure_of(axes).get_size_inches()
-    axes.quiverkey(
-        arrows, x, y, velocity, f"{velocity:g} m/s", labelpos="E", coordinates="figure",
-        fontproperties={"size": "medium"},
-    )  # fmt: skip
 
 
 @own_style()

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
     from thud.base._schema import FloorOptions
     from thud.case.constructions import Layer
@@ -262,10 +263,6 @@ def draw_mobility_fit(fit: MobilityFit, ax: Axes | None = None) -> Figure:
     return finish(upper, ax)
 
 
-# Frequencies of the impedances of the floors, Hz.
-_FREQUENCIES = np.geomspace(22.0, 720.0, 1000)
-
-
 @own_style()
 def ball_impedances(
     sources: Mapping[str, BallImpedance], floors: Mapping[str, FloorOptions], ax: Axes | None = None
@@ -275,11 +272,9 @@ def ball_impedances(
     Floors below the open markers change the level of the force by more than 1 dB.
     """
     axes = own_or(ax, 2.8)
-    impedances = {
-        name: (_FREQUENCIES, 1 / np.abs(mobility(floor, _FREQUENCIES).values))
-        for name, floor in floors.items()
-    }
-    add_curves(axes, impedances, linewidth=0.8)
+    bands = get_bands("third").center
+    impedances = {name: (bands, 1 / band_mobility(floor, bands)) for name, floor in floors.items()}
+    add_curves(axes, impedances)
     for i, (name, source) in enumerate(sources.items()):
         # Markers side by side: equal impedances stay visible.
         x = source.frequency * 1.08 ** (i - (len(sources) - 1) / 2)
@@ -291,3 +286,11 @@ def ball_impedances(
     frequency_axis(axes)
     axes.set_ylabel("Impedance, N s/m")
     return finish(axes, ax)
+
+
+def band_mobility(floor: FloorOptions, bands: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the root mean square of a floor's mobility in one-third octaves around `bands`, Hz."""
+    frequency = np.multiply.outer(bands, np.geomspace(2 ** (-1 / 6), 2 ** (1 / 6), 61))
+    values = mobility(floor, frequency.ravel()).values.reshape(frequency.shape)
+    squares: NDArray[np.float64] = np.mean(np.abs(values) ** 2, axis=1)
+    return np.sqrt(squares)

@@ -20,7 +20,6 @@ from thud.plot.style import (
     RATING_SYMBOL,
     add_levels,
     assessed_curves,
-    band_axis,
     escape_label,
     figure_of,
     finish,
@@ -160,39 +159,42 @@ _SAME = 0.05
 
 @own_style()
 def draw_floors(comparison: FloorComparison, ax: Axes | None = None) -> Figure:
-    """Draw levels in the room, ratings with uncertainties above, and below what leads to them.
-
-    The axes of a user show the levels.
-    """
-    predictions = comparison.predictions.values()
-    rows = 0.3 + 0.35 * len(predictions)
-    panels = own_panels(ax, 5.2 + rows, 5, height_ratios=[rows, 1.4, *[1] * 3])
-    shown = panels[-4:]
-    # From top to bottom: from the level back to the force.
-    steps = [*zip(_STEPS, zip(*map(_step_values, predictions), strict=True), strict=True)][::-1]
-    nominal = next(iter(predictions)).frequency
-    for axes, ((title, unit, reference), curves) in zip(shown, steps, strict=ax is None):
-        band_axis(axes, "third", nominal)
-        blank = " " if "\n" in title else "\n"
-        axes.set_ylabel(f"{title},{blank}{unit}{reference}")
-        if title == _STEPS[0][0] and len(curves) > 1 and np.ptp(curves, axis=0).max() < _SAME:
-            axes.plot(curves[0], color="black", marker=".", linewidth=1)
-            axes.text(
-                0.97, 0.9, "equal for all floors", transform=axes.transAxes, ha="right", va="top"
-            )
-            continue
-        levels = dict(zip(comparison.predictions, curves, strict=True))
-        add_levels(axes, levels, "third", nominal, 3.5)
+    """Draw ratings with their uncertainties, and levels in the room; axes of a user show these."""
+    panels = own_panels(ax, 2.6 + 0.35 * len(comparison.predictions), 2, height_ratios=[1, 2])
+    _draw_step(panels[-1], comparison, len(_STEPS) - 1)
     if ax is not None:
         return finish(ax, ax)
-    for axes in shown[:-1]:
-        axes.tick_params(axis="x", labelbottom=False)
-        axes.set_xlabel("")
     _draw_ratings(panels[0], comparison)
+    legend_above(panels[1], panels[0])
+    return figure_of(panels[0])
+
+
+@own_style()
+def floor_steps(comparison: FloorComparison) -> Figure:
+    """Draw what leads to the levels: forces, energies into the floors, radiated shares."""
+    panels = own_panels(None, 4.2, len(_STEPS) - 1, sharex=True)
+    for i, axes in enumerate(panels):
+        _draw_step(axes, comparison, i)
+        axes.label_outer()
     figure = figure_of(panels[0])
-    figure.align_ylabels(shown)
-    legend_above(shown[0], panels[0])
+    figure.align_ylabels()
+    legend_above(panels[1])
     return figure
+
+
+def _draw_step(axes: Axes, comparison: FloorComparison, step: int) -> None:
+    """Draw one step from force to room of all floors; forces that are equal as one curve."""
+    title, unit, reference = _STEPS[step]
+    predictions = comparison.predictions
+    nominal = next(iter(predictions.values())).frequency
+    curves = {name: _step_values(found)[step] for name, found in predictions.items()}
+    if step == 0 and len(curves) > 1 and np.ptp([*curves.values()], axis=0).max() < _SAME:
+        axes.text(0.97, 0.9, "equal for all floors", transform=axes.transAxes, ha="right", va="top")
+        axes.plot(next(iter(curves.values())), color="black", marker=".", linewidth=1)
+        curves = {}
+    add_levels(axes, curves, "third", nominal, 3.5)
+    blank = " " if "\n" in title else "\n"
+    axes.set_ylabel(f"{title},{blank}{unit}{reference}")
 
 
 def floors_html(comparison: FloorComparison) -> str:

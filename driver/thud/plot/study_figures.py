@@ -130,7 +130,7 @@ def _draw_colors(
     *,
     is_margin: bool,
 ) -> Colorbar:
-    """Draw values as colors, a margin of 0 white, with lines at round values."""
+    """Draw values as colors, a margin of 0 white and with lines at round values."""
     low, high = float(values.min()), float(values.max())
     style: dict[str, Any] = {"cmap": "cividis_r"}
     if is_margin:
@@ -144,9 +144,8 @@ def _draw_colors(
     fine = np.linspace(steps[0], steps[-1], 5 * (len(steps) - 1) + 1)
     filled = axes.contourf(*position, values, levels=fine, **style)
     bar = figure_of(axes).colorbar(filled, ax=axes, ticks=steps)
-    inside = steps[(steps > values.min()) & (steps < values.max())]
-    inside = inside[inside != 0] if is_margin else inside
-    if inside.size:
+    inside = steps[(steps > values.min()) & (steps < values.max()) & (steps != 0)]
+    if is_margin and inside.size:
         # Their values are those of the lines in the bar: numbers would lie on the marks.
         lines = axes.contour(
             *position, values, inside, colors="0.25", linewidths=0.4, linestyles="-"
@@ -162,13 +161,16 @@ def _draw_limits(
     limits: list[tuple[str, float]],
     color: str,
 ) -> None:
-    """Draw limits that are within the values as lines."""  # fmt: skip
+    """Draw limits that are within the values as lines."""
     for i, (name, limit) in enumerate(limits):
         # Closer to an end of the values the line would be a point in a corner.
         if values.min() < limit - MIN_RANGE and limit + MIN_RANGE < values.max():
-            axes.contour(
+            lines = axes.contour(
                 *position, values, [limit], colors=color, linewidths=1.3, linestyles=[LINES[i]]
             )
+            if limit:
+                # Ratings are rounded before they are compared: 45.5 dB is the end of 45 dB.
+                axes.clabel(lines, fmt=lambda level: f"{int(level)} dB", fontsize="small")
             axes.plot([], [], label=name, color=color, linewidth=1.3, linestyle=LINES[i])
 
 

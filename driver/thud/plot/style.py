@@ -173,17 +173,17 @@ def legend_above(axes: Axes, *others: Axes, title: str = "") -> None:
         for panel in (axes, *others)
         for handle, name in zip(*panel.get_legend_handles_labels(), strict=True)
     ]
-    if len(entries) <= (not title):
+    if len(entries) <= 1 and not title:
         return
-    handles, names = zip(*entries, strict=True)
+    handles, names = [handle for handle, _ in entries], [name for _, name in entries]
     has_formula = any("$" in text.replace(r"\$", "") for text in (*names, title))
     size = "medium" if has_formula else "small"
     rows = 0
     while True:
         rows += 1
         legend = figure.legend(
-            handles, names, loc="outside upper left", ncols=-(-len(names) // rows), title=title,
-            alignment="left", fontsize=size, title_fontsize=size,
+            handles, names, loc="outside upper left", ncols=max(1, -(-len(names) // rows)),
+            title=title, alignment="left", fontsize=size, title_fontsize=size,
         )  # fmt: skip
         box = legend.get_window_extent()
         if rows >= len(names) or box.width < 0.97 * figure.bbox.width:
@@ -194,8 +194,8 @@ def legend_above(axes: Axes, *others: Axes, title: str = "") -> None:
 
 
 def escape_label(label: str) -> str:
-    """Return a label that matplotlib neither takes for a formula nor hides."""
-    return label.lstrip("_").replace("$", r"\$")
+    """Return a name in words, which matplotlib neither takes for a formula nor hides."""
+    return label.replace("_", " ").lstrip().replace("$", r"\$")
 
 
 def curve_style(i: int, marker_size: float = 0.0) -> dict[str, Any]:

@@ -17,9 +17,10 @@ from thud.plot.style import (
     FORCE_NAMES,
     RATING_SYMBOL,
     curve_style,
+    figure_of,
     finish,
+    own_panels,
     own_style,
-    panel_grid,
 )
 
 if TYPE_CHECKING:
@@ -41,10 +42,10 @@ _PLAIN_RANGE = (1e-2, 1e4)
 _MIN_STEP_RATIO, _MIN_DECADE_RATIO = 5.0, 200.0
 # Maximum number of ungrouped values of a parameter, and number of groups.
 _MAX_VALUES, _GROUP_COUNT = 32, 16
-# Maximum number of markers of a line; half as many in half the width.
+# Maximum number of markers of a line.
 _MAX_MARKERS = 16
-# Maximum number of values of a text parameter that have a panel each.
-_MAX_PANELS = 6
+# Maximum number of values of a text parameter that have a line each.
+_MAX_LINES = 6
 # Smallest range of levels that is drawn, dB.
 MIN_RANGE = 0.05
 
@@ -96,15 +97,16 @@ def parameter_label(parameter: xr.DataArray) -> str:
 
 
 class _Curves(NamedTuple):
-    """Levels of each sample, dB, shape (n_sample, n_curve), names of the curves, and their axis.
+    """Levels of each sample, dB, shape (n_sample, n_panel), and the titles of their panels.
 
-    The tolerance is the minimum and the maximum one of levels relative to nominal ones, dB.
+    The tolerance of each panel is the minimum and the maximum one over the samples, of levels
+    relative to nominal ones, dB.
     """
 
     level: NDArray[np.float64]
-    names: list[str]
+    titles: list[str]
     label: str
-    tolerance: tuple[float, ...] = ()
+    tolerance: NDArray[np.float64] | None = None
 
 
 @own_style()
@@ -112,9 +114,10 @@ def draw_sweep(result: Sweep | Ensemble, ax: Axes | None = None) -> Figure:
     """Draw octave levels against the first numeric parameter that has several values.
 
     Levels are those of the assessed force relative to the nominal ones, dB; for a case with a room
-    the rating of the levels in it is drawn instead. The first text
-    parameter with up to six values has a panel for each; axes of a user show the first. Lines are
-    medians over the other parameters; shades extend from the minimum to the maximum.
+    the rating of the levels in it is drawn instead. Each octave has a panel with its tolerance;
+    axes of a user show the lowest. The first text parameter with up to six values has a line for
+    each; lines are medians over the other parameters, shades extend from the minimum to the
+    maximum.
     """
     dataset = result.to_xarray()
     columns = _columns(dataset)
@@ -122,34 +125,36 @@ def draw_sweep(result: Sweep | Ensemble, ax: Axes | None = None) -> Figure:
     numeric = [name for name in varied if columns[name].dtype.kind in "iuf"]
     name = (numeric or varied or list(columns))[0]
     texts = [n for n in varied if n not in numeric and n != name]
-    panel_parameter = next((n for n in texts if len(np.unique(columns[n])) <= _MAX_PANELS), None)
+    line_parameter = next((n for n in texts if len(np.unique(columns[n])) <= _MAX_LINES), None)
     if "room_rating" in dataset:
         level = dataset["room_rating"].values.reshape(-1, 1)
-        label = f"{RATING_SYMBOL} in the room below,\ndB re 20 µPa"
-        drawn = _Curves(level, ["in the room"], label)
+        drawn = _Curves(level, ["in the room"], f"{RATING_SYMBOL} in the room below,\ndB re 20 µPa")
     else:
         drawn = _get_relative_levels(dataset, columns)
-    masks = {"": np.ones(len(columns[name]), dtype=bool)}
-    if panel_parameter:
-        values = columns[panel_parameter]
-        masks = {str(value): values == value for value in np.unique(values)}
-    column_count = 1 if len(masks) == 1 else 2
-    height = 2.5 if column_count == 1 else 1.8
-    figure, panels = panel_grid(len(masks), column_count, height, shared=True, ax=ax)
+    lines = {"": np.ones(len(columns[name]), dtype=bool)}
+    if line_parameter:
+        values = columns[line_parameter]
+        lines = {str(value): values == value for value in np.unique(values)}
+    count = len(drawn.titles)
+    panels = own_panels(ax, 2.5 if count == 1 else 1.0 * count, count, sharex=True)
     has_shades = False
-    for axes, (title, mask) in zip(panels, masks.items(), strict=ax is None):
-        # The maximum tolerance of all octaves around the nominal level, the minimum on top.
-        for width, color in zip(drawn.tolerance[::-1], ("0.92", "0.84"), strict=False):
-            axes.axhspan(-width, width, color=color, linewidth=0, zorder=0)
-        if drawn.tolerance:
+    for i, (axes, title) in enumerate(zip(panels, drawn.titles, strict=ax is None)):
+        if count > 1:
+            axes.text(1.02, 0.5, title, transform=axes.transAxes, rotation=90, va="center")
+        if drawn.tolerance is not None:
+            for width, color in zip(drawn.tolerance[i, ::-1], ("0.92", "0.84"), strict=True):
+                axes.axhspan(-width, width, color=color, linewidth=0, zorder=0)
             axes.axhline(0, color="0.45", linewidth=0.8)
-        curves = drawn._replace(level=np.where(mask[:, np.newaxis], drawn.level, np.nan))
-        max_markers = _MAX_MARKERS // column_count
-        has_shades |= _draw_curves(axes, dataset[name], columns[name], curves, max_markers)
-        axes.set_title(title.replace("_", " "))
+        for j, (value, mask) in enumerate(lines.items()):
+            level = np.where(mask, drawn.level[:, i], np.nan)
+            label = humanize(value)
+            has_shades |= _draw_line(axes, dataset[name], columns[name], level, label, j)
+    for axes in panels if ax is None else ():
+        axes.label_outer()
+    figure = figure_of(panels[0])
     (ax.set_ylabel if ax is not None else figure.supylabel)(drawn.label)
-    others = [n for n in varied if n not in {name, panel_parameter}]
-    explanation = _get_explanation(drawn, panel_parameter, others, has_shades=has_shades)
+    others = [n for n in varied if n not in {name, line_parameter}]
+    explanation = _get_explanation(drawn, others, has_shades=has_shades)
     return finish(panels[0], ax, explanation)
 
 
@@ -170,19 +175,23 @@ def _get_relative_levels(dataset: xr.Dataset, columns: Columns) -> _Curves:
     forces = columns.get("force", np.full(count, dataset.attrs["assessed_force"]))
     sources = columns.get("source", np.full(count, dataset.attrs["limits"]))
     level = np.where((forces == "floor")[:, np.newaxis], levels["floor"], levels["elastic"])
-    tolerances: list[float] = []
-    for source in np.unique(sources):
-        lower, upper = octave_limits(source)
+    limits = [octave_limits(source) for source in np.unique(sources)]
+    for source, (lower, upper) in zip(np.unique(sources), limits, strict=True):
         level[sources == source] -= (lower + upper) / 2
-        tolerances.extend((upper - lower) / 2)
+    half = np.array([(upper - lower) / 2 for lower, upper in limits])
     force = "assessed force" if "force" in columns else FORCE_NAMES[dataset.attrs["assessed_force"]]
     names = [f"{band:g} Hz" for band in get_bands().nominal]
     label = f"Level − nominal, dB\n({force})"
-    return _Curves(level, names, label, (min(tolerances), max(tolerances)))
+    return _Curves(level, names, label, np.transpose([half.min(axis=0), half.max(axis=0)]))
 
 
-def _draw_curves(
-    axes: Axes, parameter: xr.DataArray, values: NDArray[Any], curves: _Curves, max_markers: int
+def _draw_line(  # noqa: PLR0913, PLR0917 - what is drawn, and how
+    axes: Axes,
+    parameter: xr.DataArray,
+    values: NDArray[Any],
+    level: NDArray[np.float64],
+    label: str,
+    style: int,
 ) -> bool:
     """Draw the levels of samples, without NaN, against a parameter; return whether they range."""
     positions, groups, names = _group_values(values)
@@ -195,17 +204,14 @@ def _draw_curves(
     # Slow to import.
     import pandas as pd
 
-    grouped = pd.DataFrame(curves.level).groupby(groups)
+    grouped = pd.Series(level).groupby(groups)
     middle, lower, upper = (f().to_numpy() for f in (grouped.median, grouped.min, grouped.max))
-    has_shades = False
-    for i, title in enumerate(curves.names):
-        style = curve_style(i, 3 if len(positions) <= max_markers else 0)
-        axes.plot(positions, middle[:, i], label=title, **style)
-        if np.nanmax(upper[:, i] - lower[:, i], initial=0) > MIN_RANGE:
-            axes.fill_between(
-                positions, lower[:, i], upper[:, i], color=COLORS[i], alpha=0.15, linewidth=0
-            )
-            has_shades = True
+    marker_size = 3 if len(positions) <= _MAX_MARKERS else 0
+    axes.plot(positions, middle, label=label, **curve_style(style, marker_size))
+    has_shades = bool(np.nanmax(upper - lower, initial=0) > MIN_RANGE)
+    if has_shades:
+        color = COLORS[style % len(COLORS)]
+        axes.fill_between(positions, lower, upper, color=color, alpha=0.15, linewidth=0)
     return has_shades
 
 
@@ -223,19 +229,14 @@ def _group_values(
     return distinct.astype(float), groups, None
 
 
-def _get_explanation(
-    drawn: _Curves, panel_parameter: str | None, others: list[str], *, has_shades: bool
-) -> str:
-    """Return the explanation of panels, lines, shades and gray areas."""
+def _get_explanation(drawn: _Curves, others: list[str], *, has_shades: bool) -> str:
+    """Return the explanation of lines, shades and gray areas."""
     lines = []
-    if panel_parameter:
-        lines.append(f"Panels: {humanize(panel_parameter)}")
     if others:
         names = humanize(others[0]) if len(others) == 1 else f"{len(others)} other parameters"
         lines.append(
             f"Lines: median over {names}; shades: range" if has_shades else f"Also varied: {names}"
         )
-    if drawn.tolerance:
-        minimum, maximum = drawn.tolerance
-        lines.append(f"Gray: tolerances of the octaves, ±{minimum:g} to ±{maximum:g} dB")
+    if drawn.tolerance is not None:
+        lines.append("Gray: tolerance of the octave")
     return "\n".join(lines)
