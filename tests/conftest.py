@@ -1,7 +1,10 @@
-"""Oracles: what tests hold against independent answers, and the record of it.
+"""Oracles: what tests hold against independent answers, and the record of it; approved snapshots.
 
 `pytest --oracles FILE` runs the tests that have oracles and writes what they measured as JSON, from
 which the page `docs/validation.md` is made (`./bootstrap validation`).
+
+`pytest --renew` writes the approved texts in the folders `approved` anew: look at their changes
+before you commit them.
 """
 
 from __future__ import annotations
@@ -20,6 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 OPTION = "--oracles"
+RENEW = "--renew"
 ORACLES = pytest.StashKey[dict[str, dict[str, Any]]]()
 CURVES = pytest.StashKey[dict[str, dict[str, Any]]]()
 
@@ -49,9 +53,29 @@ def curve(record_property: Callable[[str, object], None]) -> Callable[..., None]
     return keep
 
 
+@pytest.fixture
+def approved(request: pytest.FixtureRequest) -> Callable[[str, str], None]:
+    """Return a function that compares a text with an approved one, or writes that.
+
+    The approved texts stand in the folder `approved` beside the test.
+    """
+
+    def compare(name: str, text: str) -> None:
+        path = request.path.parent / "approved" / name
+        text = text.rstrip("\n") + "\n"
+        if request.config.getoption(RENEW):
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(text, encoding="utf-8")
+        assert path.exists(), f"{path} is missing: pytest {RENEW}"
+        assert text == path.read_text("utf-8")
+
+    return compare
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Add the file of the record."""
+    """Add the file of the record, and the switch of approved texts."""
     parser.addoption(OPTION, type=Path, help="run the tests with oracles and write them as JSON")
+    parser.addoption(RENEW, action="store_true", help="write the approved texts anew")
 
 
 def pytest_configure(config: pytest.Config) -> None:
