@@ -122,7 +122,9 @@ def test_keys_of_floor_and_room_have_an_effect_only_with_their_switch(kind: type
     def result(values: dict[str, Any]) -> list[float]:
         if kind is thud.Room:
             return list(thud.predict_level(impact, thud.Plate(), kind(**values)).level)
-        return list(thud.mobility(kind(**values), [20.0, 50.0, 100.0]).values)
+        # A small floor has few modes.
+        floor = kind(length=2.5, width=2.0, **values)
+        return list(thud.mobility(floor, [20.0, 50.0, 100.0]).values)
 
     off: dict[str, Any] = {}
     before: dict[str, list[float]] = {}
@@ -163,23 +165,6 @@ def test_keys_of_conditions_have_no_effect_without_their_choice() -> None:
             assert np.array_equal(*forces) != (choice in choices), (owner, key.name, choice)
 
 
-def test_modulus_that_is_too_low_is_named_with_three_digits() -> None:
-    case = new_case({"model": {"name": "modal_ball"}, "ball": {"youngs_modulus": 5e4}})
-    with pytest.raises(thud.ThudError) as raised:
-        compute(case)
-    report = describe_error(raised.value)
-    assert report["field"] == "ball.youngs_modulus"
-    assert report["error"].startswith("Young's modulus = 50000.0 Pa is too low for this drop: ")
-    assert not re.search(r"\d\.\d{3,}", report["error"])
-
-
-@pytest.mark.parametrize("value", ["x", True, None])
-def test_value_of_a_wrong_type_is_not_named_as_a_number(value: object) -> None:
-    report = error_of({"drop": {"height": value}})
-    assert report["field"] == "drop.height"
-    assert f"= {value!r} is" in report["error"]
-
-
 @pytest.mark.parametrize("modulus", [1e4, 3e4, 5e4])
 def test_duration_that_a_message_allows_is_accepted(modulus: float) -> None:
     # A coarse mesh: only the check of the duration matters.
@@ -204,16 +189,9 @@ SLAB: dict[str, Any] = {
 }  # fmt: skip
 
 
-def _by_shell(values: dict[str, Any]) -> dict[str, Any]:
-    """Return the values of a case of the modal ball with a shell in its place."""
-    others = {group: keys for group, keys in values.items() if group != "modal_ball"}
-    return {**others, "model": {"name": "hollow_sphere"}}
-
-
 def test_headline_of_a_room_is_the_level_with_its_range() -> None:
-    answer = answer_case(new_case(SLAB))
+    room = answer_case(new_case(SLAB))["room"]
     prediction = thud.predict_level(floor=thud.construction("concrete 180").floor, room=thud.Room())
-    room = answer["room"]
     rating = prediction.rating
     assert (room["result"], room["rounded"]) == ("level", rating.rounded)
     assert room["uncertainty_of_rating"] == rating.uncertainty
@@ -225,34 +203,27 @@ def test_headline_of_a_room_is_the_level_with_its_range() -> None:
         for name, value in prediction.rating.contributions.items()
     ]
     assert room["uncertainty"] == pytest.approx(prediction.uncertainty, abs=1e-4)
-    for required, result in ((40.0, "does_not_conform"), (58.0, "undecided"), (80.0, "conforms")):
-        values = {**SLAB, "room": {"required": required, "rating": "thirds"}}
-        assert answer_case(new_case(values))["room"]["result"] == result
-    # A source that does not conform, and another rating than that of the standard headline.
-    values = {**_by_shell(SLAB), "room": {"required": 49.0}}
+
+
+@pytest.mark.parametrize(
+    ("required", "rating", "model", "result"),
+    [
+        (40.0, "thirds", "modal_ball", "does_not_conform"),
+        (58.0, "thirds", "modal_ball", "undecided"),
+        (80.0, "standardized", "modal_ball", "conforms"),
+        # A source that does not conform.
+        (49.0, "octaves", "hollow_sphere", "undecided"),
+    ],
+)
+def test_verdict_on_a_room_names_its_rating(
+    required: float, rating: str, model: str, result: str
+) -> None:
+    values = SLAB | {"model": {"name": model}, "room": {"required": required, "rating": rating}}
     room = answer_case(new_case(values))["room"]
-    assert room["result"] == "undecided"
-    assert "the source does not conform" in room["detail"]
-
-
-def test_choices_of_a_rating_name_their_standards() -> None:
-    rating = FIELDS["room", "rating"]
-    assert rating["choices"] == {
-        "octaves": "KS F ISO 717-2", "thirds": "ISO 717-2", "standardized": "ISO 16283-2",
-    }  # fmt: skip
-    assert "one-third octaves (ISO 717-2)" in rating["help"]
-
-
-def test_group_without_effect_is_refused() -> None:
-    values = {"model": {"name": "hollow_sphere"}, "mesh": {"radial_elements": 3}}
-    with pytest.raises(thud.InputError, match="mesh: does nothing"):
-        new_case(values)
-
-
-def test_headline_of_a_room_names_its_rating() -> None:
-    for rating, title in RATINGS.items():
-        case = new_case({**SLAB, "room": {"required": 49.0, "rating": rating}})
-        assert answer_case(case)["room"]["detail"].startswith(title)
+    assert room["result"] == result
+    assert RATINGS[rating] in room["detail"]
+    # The choices of the field are the standards of the ratings.
+    assert FIELDS["room", "rating"]["choices"][rating] in RATINGS[rating]
 
 
 def test_every_criterion_names_standard_and_limits_and_explains_itself() -> None:
@@ -266,34 +237,6 @@ def test_every_criterion_names_standard_and_limits_and_explains_itself() -> None
     levels = answer["levels"]
     thirds = 10 ** (np.reshape(levels["thirds"]["level"], (5, 3)) / 10)
     assert 10 * np.log10(thirds.sum(axis=1)) == pytest.approx(levels["level"], abs=1e-3)
-
-
-JOISTS = {"floor": {"name": "joist_floor"}}
-OUT_OF_RANGE = {
-    "ball.wall_thickness": (
-        {}, 0.2, "Wall thickness = 200 mm", "more than 0 mm and less than outer radius, 89 mm",
-    ),
-    "plate.thickness": (
-        {"floor": {"name": "plate"}}, 5.0, "Thickness = 5000 mm",
-        "at least 1 mm and at most 2000 mm",
-    ),
-    "sampling.sample_rate": (
-        {}, 1000.0, "Sample rate = 1 kHz", "at least 2 kHz and at most 10000 kHz",
-    ),
-    "joist_floor.spacing": (
-        JOISTS, 0.01, "Spacing = 10 mm",
-        "more than joist width, 60 mm and less than width, 5000 mm",
-    ),
-    "sampling.substeps": ({}, 0, "Substeps = 0", "at least 1 and at most 10000, whole"),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("key", OUT_OF_RANGE)
-def test_errors_speak_the_label_and_the_unit_of_the_field(key: str) -> None:
-    values, value, shown, allowed = OUT_OF_RANGE[key]
-    group, name = key.split(".")
-    error = error_of({"model": {"name": "hollow_sphere"}, **values, group: {name: value}})
-    assert error == {"error": f"{shown} is not allowed; allowed: {allowed}", "field": key}
 
 
 def test_lengths_that_may_be_zero_are_in_the_unit_of_their_maximum() -> None:

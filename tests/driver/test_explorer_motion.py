@@ -11,13 +11,10 @@ from thud.explorer.models import model_facts
 
 @pytest.mark.parametrize(
     ("name", "is_computed"),
-    [
-        ("hollow_sphere", False), ("modal_ball", False), ("finite_element", True),
-        ("two_mass", None), ("measured_modes", None), ("hunt_crossley", None),
-    ],
-)  # fmt: skip
+    [("hollow_sphere", False), ("modal_ball", False), ("finite_element", True), ("two_mass", None)],
+)
 def test_section_of_a_ball_is_flattened_and_returns(name: str, *, is_computed: bool | None) -> None:
-    values = next(facts["values"] for facts in model_facts() if facts["name"] == name)
+    (values,) = (facts["values"] for facts in model_facts() if facts["name"] == name)
     motion = answer_case(new_case({"model": {"name": name}, **values}))["motion"]  # type: ignore[dict-item]
     if is_computed is None:
         assert motion is None
