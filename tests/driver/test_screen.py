@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import fcntl
+import io
 import os
 import pty
 import re
+import shlex
 import shutil
 import struct
 import subprocess
-import sys
 import termios
 from collections import Counter
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from typing import TYPE_CHECKING
 
 import pytest
-from conftest import INPUTS, MINIMAL, REPOSITORY
+from conftest import INPUTS, MINIMAL, REPOSITORY, python
 from hypothesis import given, strategies as st
 
 import thud
@@ -24,17 +26,19 @@ from thud.base.tables import WIDTH, format_rows, wrap
 from thud.cli.screen import RED, YELLOW
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterator, Mapping
     from pathlib import Path
 
-    from conftest import CaseFile
+    from conftest import CaseFile, Run
 
 FLOORS = {path.stem: path for path in sorted((REPOSITORY / "inputs/floors").glob("*.nml"))}
 CONTROL = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
-COLOR_ENDS = "\x1b[0m"
+TERMINAL = {"TERM": "xterm-256color", "COLUMNS": str(WIDTH)}
+# Environments in which nothing is colored.
+PLAIN: list[dict[str, str]] = [{"NO_COLOR": "1"}, {"TERM": "dumb"}, {"TERM": ""}]
 # Numbers that are nothing but zeros, and negative zeros.
 MEANINGLESS = re.compile(r"(?<![\d.])(?:[-−]0(?:\.0+)?|0\.000+)(?![\d.])")
-# Names of commands with arguments; they are run in a directory with a copy of the inputs.
+# Names of commands of the driver with arguments, in a directory with a copy of the inputs.
 COMMANDS = {
     "assess": "assess inputs/rubber_ball_modal.nml",
     "compare": "compare inputs/rubber_ball_100cm.nml inputs/recordings/drop_1.csv "
@@ -58,13 +62,13 @@ QUICK = ("assess", "predict", "rate")
 def on_terminal(
     *command: str | Path, folder: Path, environment: Mapping[str, str] | None = None
 ) -> str:
-    """Return what a command prints on a terminal of 80 columns."""
+    """Return what the executable prints on a terminal of 80 columns."""
     own, others = pty.openpty()
     fcntl.ioctl(own, termios.TIOCSWINSZ, struct.pack("HHHH", 24, WIDTH, 0, 0))
-    known = {key: value for key, value in os.environ.items() if key not in {"NO_COLOR", "COLUMNS"}}
+    known = {key: value for key, value in os.environ.items() if key != "NO_COLOR"}
     process = subprocess.Popen(
         list(map(str, command)), cwd=folder, stdin=others, stdout=others, stderr=others,
-        env=known | {"TERM": "xterm-256color"} | dict(environment or {}), start_new_session=True,
+        env=known | TERMINAL | dict(environment or {}), start_new_session=True,
     )  # fmt: skip
     os.close(others)
     printed = b""
@@ -81,22 +85,51 @@ def on_terminal(
     return printed.decode().replace("\r\n", "\n")
 
 
-def widest(printed: str) -> str:
-    """Return the widest line of what a terminal shows."""
-    return max(re.split(r"[\r\n]", CONTROL.sub("", printed)), key=len)
+class Terminal(io.StringIO):
+    """What the driver takes for a terminal."""
+
+    def isatty(self) -> bool:
+        """Return that it is one."""
+        return True
+
+
+@contextmanager
+def terminal(**environment: str) -> Iterator[Terminal]:
+    """Let this process print on a terminal of 80 columns."""
+    screen = Terminal()
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(screen), redirect_stderr(screen):
+        patch.delenv("NO_COLOR", raising=False)
+        for name, value in {**TERMINAL, **environment}.items():
+            patch.setenv(name, value)
+        yield screen
+
+
+def screen_of(command: str) -> str:
+    """Return what a command of the driver prints on a terminal."""
+    with terminal() as screen:
+        assert cli.main(shlex.split(command)) == 0
+    return screen.getvalue()
 
 
 @pytest.fixture(scope="module")
-def workplace(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a directory with the inputs."""
     folder = tmp_path_factory.mktemp("workplace")
     shutil.copytree(REPOSITORY / "inputs", folder / "inputs")
     return folder
 
 
+@pytest.fixture
+def workplace(inputs: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the directory with the inputs, which is the working directory."""
+    monkeypatch.chdir(inputs)
+    return inputs
+
+
 def check_screen(printed: str) -> None:
     """Check widths and digits of a screen."""
-    assert len(widest(printed)) <= WIDTH
+    lines = re.split(r"[\r\n]", CONTROL.sub("", printed))
+    assert len(max(lines, key=len)) <= WIDTH
     assert "Traceback" not in printed
     shown = CONTROL.sub("", re.sub(r"[^\n]*\r", "", printed))
     assert not MEANINGLESS.findall(shown)
@@ -105,19 +138,17 @@ def check_screen(printed: str) -> None:
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=() if n in QUICK else pytest.mark.slow) for n in COMMANDS]
 )
-def test_screens_of_commands_have_80_columns(name: str, workplace: Path) -> None:
+@pytest.mark.usefixtures("workplace")
+def test_screens_of_commands_have_80_columns(name: str) -> None:
     if name == "history":
-        measure = f"{sys.executable} -m thud {COMMANDS['measure']} -q"
-        subprocess.run(["/bin/sh", "-c", measure], cwd=workplace, check=True, capture_output=True)
-    command = f"exec {sys.executable} -m thud {COMMANDS[name]}"
-    printed = on_terminal("/bin/sh", "-c", command, folder=workplace)
-    check_screen(printed)
+        screen_of(f"{COMMANDS['measure']} -q")
+    check_screen(screen_of(COMMANDS[name]))
 
 
 @pytest.mark.parametrize(
-    "path", [*INPUTS[:3], FLOORS["joists"], *(
+    "path", [INPUTS[0], FLOORS["joists"], *(
         pytest.param(p, marks=pytest.mark.slow)
-        for p in [*INPUTS[3:], *(path for name, path in FLOORS.items() if name != "joists")]
+        for p in [*INPUTS[1:], *(path for name, path in FLOORS.items() if name != "joists")]
     )], ids=lambda path: path.stem,
 )  # fmt: skip
 def test_screens_of_runs_have_80_columns(path: Path, executable: str, workplace: Path) -> None:
@@ -128,63 +159,61 @@ def test_screens_of_runs_have_80_columns(path: Path, executable: str, workplace:
         if path in FLOORS.values():
             assert "E+0" not in printed
             assert re.search(r"velocity of the floor +\d", printed)
-    run = (sys.executable, "-m", "thud", "run", "--no-figures", case)
-    check_screen(on_terminal(*run, folder=workplace))
+    check_screen(screen_of(f"run --no-figures {case}"))
 
 
 def test_screens_of_options_have_80_columns(executable: str, tmp_path: Path) -> None:
-    driver = [sys.executable, "-m", "thud", "measure", "--help"]
-    for command in (*([executable, one] for one in ("--help", "--keys", "--nonsense")), driver):
-        assert len(widest(on_terminal(*command, folder=tmp_path))) <= WIDTH
+    for option in ("--help", "--keys", "--nonsense"):
+        check_screen(on_terminal(executable, option, folder=tmp_path))
+    check_screen(screen_of("measure --help"))
 
 
-def test_numbers_of_the_solver_are_shown_if_asked_for(
-    executable: str, workplace: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    case = "inputs/rubber_ball_fe.nml"
+def test_numbers_of_the_solver_are_shown_if_asked_for(run: Run, case_file: CaseFile) -> None:
+    mesh = "&mesh radial_elements = 4, polar_elements = 32 /\n"
+    case = case_file(MINIMAL.replace("hollow_sphere", "finite_element") + mesh)
     words = ("minimum step", "shear modulus", "radial elements")
-    brief = on_terminal(executable, case, folder=workplace)
-    assert not any(word in brief for word in words)
-    printed = on_terminal(executable, case, "--verbose", folder=workplace)
-    assert all(word in printed for word in words)
-    summary = (workplace / "outputs/rubber_ball_fe/summary.nml").read_text()
-    assert "minimum_step" in summary
-    assert cli.main(["run", "--verbose", "--quiet", case]) == 1
-    assert "--verbose" in capsys.readouterr().err
+    brief, verbose = run(case).stdout, run(case, "--verbose").stdout
+    assert [(word in brief, word in verbose) for word in words] == [(False, True)] * 3
+    assert "minimum_step" in (case.parent / "outputs/case/summary.nml").read_text()
 
 
+@pytest.mark.usefixtures("working_directory")
 def test_colors_are_those_of_the_terminal(
-    executable: str, case_file: CaseFile, tmp_path: Path
+    executable: str, case_file: CaseFile, run: Run, tmp_path: Path
 ) -> None:
     case_file(MINIMAL.replace("&ball", "&ball poisson_ratio = 0.4"), "ball.nml")
-    commands = ([executable, "ball.nml"], [sys.executable, "-m", "thud", "run", "--no-figures"])
-    for *start, name in (commands[0], [*commands[1], "ball.nml"]):
-        error = on_terminal(*start, "nowhere.nml", folder=tmp_path)
-        assert re.match(rf"\x1b\[{RED}mthud(-driver)?:\x1b\[0m nowhere\.nml", error)
-        command = [*start, name]
-        printed = on_terminal(*command, folder=tmp_path)
-        assert (f"\x1b[{RED}mdoes not conform{COLOR_ENDS}" in printed) == (command[0] == executable)
-        assert re.search(rf"\x1b\[{YELLOW}mthud(-driver)?:\x1b\[0m ball\.nml: &ball", printed)
-        for environment in ({"NO_COLOR": "1"}, {"TERM": "dumb"}, {"TERM": ""}):
-            printed = on_terminal(*command, folder=tmp_path, environment=environment)
-            assert "does not conform" in printed
-            assert "\x1b" not in printed
-        log = subprocess.run(
-            command, cwd=tmp_path, check=True, text=True, stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT, env=os.environ | {"TERM": "xterm-256color"},
-        ).stdout  # fmt: skip
-        assert re.search(r"(?m)^thud(-driver)?: .* poisson_ratio is 0\.4, rubbers have", log)
-        assert not re.search(r"[\x00-\x09\x0b-\x1f]", log)
+    error = on_terminal(executable, "nowhere.nml", folder=tmp_path)
+    assert error.startswith(f"\x1b[{RED}mthud:\x1b[0m nowhere.nml")
+    printed = on_terminal(executable, "ball.nml", folder=tmp_path)
+    assert f"\x1b[{RED}mdoes not conform\x1b[0m" in printed
+    assert f"\x1b[{YELLOW}mthud:\x1b[0m ball.nml: &ball" in printed
+    command = "run --no-figures ball.nml"
+    assert f"\x1b[{YELLOW}mthud-driver:\x1b[0m ball.nml: &ball" in screen_of(command)
+    with terminal() as screen:
+        assert cli.main(["run", "nowhere.nml"]) == 1
+    assert screen.getvalue().startswith(f"\x1b[{RED}mthud-driver:\x1b[0m nowhere.nml")
+    for environment in PLAIN:
+        printed = on_terminal(executable, "ball.nml", folder=tmp_path, environment=environment)
+        with terminal(**environment) as screen:
+            assert cli.main(command.split()) == 0
+        for text in (printed, screen.getvalue()):
+            assert "does not conform" in text
+            assert "\x1b" not in text
+    # In a log a warning is one line, and nothing controls a terminal.
+    for log in (run("ball.nml"), python("-m", "thud", *command.split(), cwd=tmp_path)):
+        assert re.search(r"(?m)^thud(-driver)?: .* poisson_ratio is 0\.4, rubbers have", log.stderr)
+        assert not re.search(r"[\x00-\x09\x0b-\x1f]", log.stdout + log.stderr)
 
 
-def test_progress_is_shown_on_a_terminal_only(tmp_path: Path) -> None:
+@pytest.mark.usefixtures("working_directory")
+def test_progress_is_shown_on_a_terminal_only(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "s.toml").write_text("parameters.height = {low = 0.5, high = 1.5, count = 4}")
-    command = [sys.executable, "-m", "thud", "sweep", "--no-figures", "s.toml"]
-    printed = on_terminal(*command, folder=tmp_path)
-    assert re.search(r"\r100%\|.*\| 4/4 \[\d\d:\d\d<\d\d:\d\d, .*sample/s\]", printed)
-    shutil.rmtree(tmp_path / "outputs")
-    log = subprocess.run(command, cwd=tmp_path, check=True, text=True, capture_output=True)
-    assert re.fullmatch(r"s: 4 samples of modal_ball\n", log.stderr)
+    printed = screen_of("sweep --no-figures s.toml")
+    assert re.search(r"\r100%\|.*\| 4/4 \[\d\d:\d\d<\d\d:\d\d, .*sample.*\]", printed)
+    assert cli.main(["sweep", "--no-figures", "--replace", "s.toml"]) == 0
+    assert capsys.readouterr().err == "s: 4 samples of modal_ball\n"
 
 
 def test_paths_stay_whole(capsys: pytest.CaptureFixture[str], case_file: CaseFile) -> None:
