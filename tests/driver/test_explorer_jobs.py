@@ -22,10 +22,7 @@ from thud.explorer.server import TIME_LIMIT
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
-
 LONG = {"model": {"name": "finite_element"}, "mesh": {"radial_elements": 16, "polar_elements": 512}}
-
-
 SHELL = {"model": {"name": "hollow_sphere"}}
 
 
@@ -48,28 +45,35 @@ def _no_workers() -> None:
         time.sleep(0.05)
 
 
+def kill_child(pid: int) -> None:
+    """Kill a child; return once it has ended, as until then it counts as running."""
+    os.kill(pid, signal.SIGKILL)
+    os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
+
+
+async def await_workers(count: int) -> list[int]:
+    """Wait for a number of processes; return them."""
+    with anyio.fail_after(60):
+        while len(workers()) != count:  # noqa: ASYNC110 - another process is no event
+            await anyio.sleep(0.05)
+    return workers()
+
+
 def test_process_that_was_stopped_ends_with_its_page() -> None:
-    late = []
-
-    def kill(pid: int) -> None:
-        late.append(pid)
-        os.kill(pid, signal.SIGKILL)
-
     async def stop_and_leave() -> None:
         async with anyio.create_task_group() as group:
             group.start_soon(report_of, Jobs(1, TIME_LIMIT), LONG)
-            while not workers():  # noqa: ASYNC110 - another process is no event
-                await anyio.sleep(0.05)
-            (pid,) = workers()
+            (pid,) = await await_workers(1)
             os.kill(pid, signal.SIGSTOP)
             await anyio.sleep(0.3)
-            timer = Timer(10.0, kill, (pid,))
+            timer = Timer(10.0, os.kill, (pid, signal.SIGKILL))
             timer.start()
             group.cancel_scope.cancel()
+        # It would not end by itself.
+        assert timer.is_alive()
         timer.cancel()
 
     anyio.run(stop_and_leave)
-    assert not late
     assert not workers()
 
 
@@ -85,12 +89,6 @@ def test_process_that_stops_while_it_sends_is_ended(monkeypatch: pytest.MonkeyPa
     assert not workers()
 
 
-def kill(pid: int) -> None:
-    """Kill a child; return once it has ended, as until then it counts as running."""
-    os.kill(pid, signal.SIGKILL)
-    os.waitid(os.P_PID, pid, os.WEXITED | os.WNOWAIT)
-
-
 def test_lost_server_of_forks_is_a_sentence_and_begins_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -99,7 +97,7 @@ def test_lost_server_of_forks_is_a_sentence_and_begins_again(
         with monkeypatch.context() as patch:
             # As where it is killed after it was found to run.
             patch.setattr(forks, "ensure_running", lambda: None)
-            kill(vars(forks)["_forkserver_pid"])
+            kill_child(vars(forks)["_forkserver_pid"])
             assert (await report_of(jobs))["error"]
         assert "answer" in await report_of(jobs)
 
@@ -114,16 +112,17 @@ def test_process_works_again_until_it_is_late() -> None:
         assert workers() == [first]
         # Nobody reads that it has ended.
         os.kill(first, signal.SIGKILL)
-        while workers():  # noqa: ASYNC110 - another process is no event
-            await anyio.sleep(0.05)
+        await await_workers(0)
         assert "answer" in await report_of(jobs)
         (second,) = workers()
         os.kill(second, signal.SIGSTOP)
-        assert "5 s" in (await report_of(jobs))["error"]
+        vars(jobs)["_time_limit"] = 0.5
+        assert "0.5 s" in (await report_of(jobs))["error"]
         assert not workers()
+        vars(jobs)["_time_limit"] = TIME_LIMIT
         assert "answer" in await report_of(jobs)
 
-    anyio.run(work, Jobs(1, 5.0))
+    anyio.run(work, Jobs(1, TIME_LIMIT))
 
 
 def test_works_have_places_and_those_that_wait_end() -> None:
@@ -131,9 +130,7 @@ def test_works_have_places_and_those_that_wait_end() -> None:
         async with anyio.create_task_group() as group:
             for _ in range(4):
                 group.start_soon(report_of, jobs, LONG)
-            with anyio.fail_after(60):
-                while len(workers()) < 2:  # noqa: ASYNC110 - another process is no event
-                    await anyio.sleep(0.05)
+            await await_workers(2)
             await anyio.sleep(0.5)
             assert len(workers()) == 2
             group.cancel_scope.cancel()

@@ -6,7 +6,7 @@ import json
 import signal
 import socket
 import time
-from contextlib import closing
+from contextlib import closing, suppress
 from http.client import HTTPConnection
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,7 @@ import pytest
 from explorer_server import Served, drag, place_of, serve, solve_at
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
 SHELL = {"model": {"name": "hollow_sphere"}}
 SLOW = {"model": {"name": "finite_element"}, "mesh": {"polar_elements": 600}}
@@ -33,18 +33,21 @@ def processes_of(server: Served) -> set[psutil.Process]:
     return set(psutil.Process(server[1].pid).children(recursive=True))
 
 
-def alive(process: psutil.Process) -> bool:
-    """Return whether a process runs; one that has ended may still be listed."""
-    try:
-        return bool(process.status() != psutil.STATUS_ZOMBIE)
-    except psutil.NoSuchProcess:
+def await_end(processes: set[psutil.Process]) -> None:
+    """Wait until processes have ended; one that nobody waits for stays as a zombie."""
+
+    def is_alive(process: psutil.Process) -> bool:
+        with suppress(psutil.NoSuchProcess):
+            return bool(process.status() != psutil.STATUS_ZOMBIE)
         return False
 
+    await_that(lambda: not any(map(is_alive, processes)))
 
-def await_end(processes: set[psutil.Process]) -> None:
-    """Wait until processes have ended."""
+
+def await_that(condition: Callable[[], bool]) -> None:
+    """Wait until a condition holds."""
     end = time.monotonic() + 20
-    while any(map(alive, processes)):
+    while not condition():
         assert time.monotonic() < end
         time.sleep(0.05)
 
@@ -76,17 +79,11 @@ def test_works_end_with_their_user_and_their_server(server: Served) -> None:
         connection.request("POST", "/solve", json.dumps(SLOW), {"X-Thud-Token": token})
         return connection
 
-    def await_works(count: int) -> set[psutil.Process]:
-        end = time.monotonic() + 20
-        while len(works := processes_of(server) - before) != count:
-            assert time.monotonic() < end
-            time.sleep(0.05)
-        return works
-
     one, other = begin(), begin()
-    await_works(2)
+    await_that(lambda: len(processes_of(server) - before) == 2)
     one.close()
-    works = await_works(1)
+    await_that(lambda: len(processes_of(server) - before) == 1)
+    works = processes_of(server) - before
     server[1].kill()
     server[1].wait(20)
     await_end(works)
