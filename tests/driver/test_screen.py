@@ -13,7 +13,7 @@ import struct
 import subprocess
 import termios
 from collections import Counter
-from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from contextlib import contextmanager, redirect_stderr, redirect_stdout, suppress
 from typing import TYPE_CHECKING
 
 import pytest
@@ -26,7 +26,7 @@ from thud.base.tables import WIDTH, format_rows, wrap
 from thud.cli.screen import RED, YELLOW
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Iterator
     from pathlib import Path
 
     from conftest import CaseFile, Run
@@ -35,7 +35,7 @@ FLOORS = {path.stem: path for path in sorted((REPOSITORY / "inputs/floors").glob
 CONTROL = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")
 TERMINAL = {"TERM": "xterm-256color", "COLUMNS": str(WIDTH)}
 # Environments in which nothing is colored.
-PLAIN: list[dict[str, str]] = [{"NO_COLOR": "1"}, {"TERM": "dumb"}, {"TERM": ""}]
+PLAIN = [{"NO_COLOR": "1"}, {"TERM": "dumb"}, {"TERM": ""}]
 # Numbers that are nothing but zeros, and negative zeros.
 MEANINGLESS = re.compile(r"(?<![\d.])(?:[-−]0(?:\.0+)?|0\.000+)(?![\d.])")
 # Names of commands of the driver with arguments, in a directory with a copy of the inputs.
@@ -59,29 +59,21 @@ COMMANDS = {
 QUICK = ("assess", "predict", "rate")
 
 
-def on_terminal(
-    *command: str | Path, folder: Path, environment: Mapping[str, str] | None = None
-) -> str:
+def on_terminal(*command: str | Path, **environment: str) -> str:
     """Return what the executable prints on a terminal of 80 columns."""
     own, others = pty.openpty()
     fcntl.ioctl(own, termios.TIOCSWINSZ, struct.pack("HHHH", 24, WIDTH, 0, 0))
     known = {key: value for key, value in os.environ.items() if key != "NO_COLOR"}
     process = subprocess.Popen(
-        list(map(str, command)), cwd=folder, stdin=others, stdout=others, stderr=others,
-        env=known | TERMINAL | dict(environment or {}), start_new_session=True,
+        list(map(str, command)), stdin=others, stdout=others, stderr=others,
+        env=known | TERMINAL | environment, start_new_session=True,
     )  # fmt: skip
     os.close(others)
     printed = b""
-    with process:
-        while True:
-            try:
-                part = os.read(own, 65536)
-            except OSError:  # the other end is closed
-                break
-            if not part:
-                break
+    # Reading fails once the other end is closed.
+    with process, os.fdopen(own, "rb", buffering=0) as screen, suppress(OSError):
+        while part := screen.read(65536):
             printed += part
-    os.close(own)
     return printed.decode().replace("\r\n", "\n")
 
 
@@ -120,10 +112,9 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def workplace(inputs: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return the directory with the inputs, which is the working directory."""
+def workplace(inputs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Make the directory with the inputs the working directory."""
     monkeypatch.chdir(inputs)
-    return inputs
 
 
 def check_screen(printed: str) -> None:
@@ -151,10 +142,11 @@ def test_screens_of_commands_have_80_columns(name: str) -> None:
         for p in [*INPUTS[1:], *(path for name, path in FLOORS.items() if name != "joists")]
     )], ids=lambda path: path.stem,
 )  # fmt: skip
-def test_screens_of_runs_have_80_columns(path: Path, executable: str, workplace: Path) -> None:
+@pytest.mark.usefixtures("workplace")
+def test_screens_of_runs_have_80_columns(path: Path, executable: str) -> None:
     case = path.relative_to(REPOSITORY)
     for verbose in ([], ["--verbose"]):
-        printed = on_terminal(executable, case, *verbose, folder=workplace)
+        printed = on_terminal(executable, case, *verbose)
         check_screen(printed)
         if path in FLOORS.values():
             assert "E+0" not in printed
@@ -162,9 +154,9 @@ def test_screens_of_runs_have_80_columns(path: Path, executable: str, workplace:
     check_screen(screen_of(f"run --no-figures {case}"))
 
 
-def test_screens_of_options_have_80_columns(executable: str, tmp_path: Path) -> None:
+def test_screens_of_options_have_80_columns(executable: str) -> None:
     for option in ("--help", "--keys", "--nonsense"):
-        check_screen(on_terminal(executable, option, folder=tmp_path))
+        check_screen(on_terminal(executable, option))
     check_screen(screen_of("measure --help"))
 
 
@@ -182,9 +174,9 @@ def test_colors_are_those_of_the_terminal(
     executable: str, case_file: CaseFile, run: Run, tmp_path: Path
 ) -> None:
     case_file(MINIMAL.replace("&ball", "&ball poisson_ratio = 0.4"), "ball.nml")
-    error = on_terminal(executable, "nowhere.nml", folder=tmp_path)
+    error = on_terminal(executable, "nowhere.nml")
     assert error.startswith(f"\x1b[{RED}mthud:\x1b[0m nowhere.nml")
-    printed = on_terminal(executable, "ball.nml", folder=tmp_path)
+    printed = on_terminal(executable, "ball.nml")
     assert f"\x1b[{RED}mdoes not conform\x1b[0m" in printed
     assert f"\x1b[{YELLOW}mthud:\x1b[0m ball.nml: &ball" in printed
     command = "run --no-figures ball.nml"
@@ -193,7 +185,7 @@ def test_colors_are_those_of_the_terminal(
         assert cli.main(["run", "nowhere.nml"]) == 1
     assert screen.getvalue().startswith(f"\x1b[{RED}mthud-driver:\x1b[0m nowhere.nml")
     for environment in PLAIN:
-        printed = on_terminal(executable, "ball.nml", folder=tmp_path, environment=environment)
+        printed = on_terminal(executable, "ball.nml", **environment)
         with terminal(**environment) as screen:
             assert cli.main(command.split()) == 0
         for text in (printed, screen.getvalue()):
