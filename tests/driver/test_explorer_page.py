@@ -265,6 +265,23 @@ def _required_level(page: Page) -> None:
     enter(page, "room.required", "49")
 
 
+def _improved_floor(page: Page, **answer: Any) -> None:  # noqa: ANN401 - of the server
+    page.route("**/improve", lambda route: route.fulfill(json={"answer": answer}))
+    _required_level(page)
+    page.locator("#improve").click()
+    see(page, "#result > *").not_to_have_count(0)
+
+
+# Answers of the server on floors.
+REACHED = {"level": 48, "uncertainty": 2.3, "probability": 0.9}
+CHANGE = {"key": "plate.thickness", "value": 0.24, "factor": 4 / 3, **REACHED}
+NONE: dict[str, Any] = {
+    "changes": [],
+    "reason": "no_layer",
+    "constructions": [{"name": "X", **REACHED}],
+}
+
+
 def _compared_sources(page: Page) -> None:
     load(page, **DROP, **PLATE)
     open_door(page, "ball")
@@ -293,7 +310,8 @@ STATES: dict[str, Callable[[Page], None]] = {
     "recording_that_conforms": _conforming_recording,
     "recording_that_does_not": partial(load, **STATED),
     "recording_refused": _refused_recording,
-    "required_level": _required_level,
+    "changes_of_a_floor": partial(_improved_floor, changes=[CHANGE]),
+    "no_change_of_a_floor": partial(_improved_floor, **NONE),
     "compared_sources": _compared_sources,
     "compared_rooms": _compared_rooms,
     "floor_without_room": _floor_without_room,
@@ -442,8 +460,15 @@ def test_construction_fills_floor_and_ceiling(page: Page) -> None:
 # ---- What users met.
 
 
+# Of the models in this order, MPa; others are no ball of one material.
+MODULI = {
+    "finite_element": "2.06", "hunt_crossley": "", "measured_modes": "", "two_mass": "",
+    "modal_ball": "1.56",
+}  # fmt: skip
+
+
 def test_model_brings_its_values_and_fields(page: Page) -> None:
-    for name, modulus in (("finite_element", "2.06"), ("two_mass", ""), ("modal_ball", "1.56")):
+    for name, modulus in MODULI.items():
         choose(page, "#model", name)
         see(page, "#message").to_be_hidden()
         # Fields without an effect are not there.
