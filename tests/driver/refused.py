@@ -2,32 +2,38 @@
 
 from __future__ import annotations
 
+import os
+import shutil
+from dataclasses import replace
+from functools import cache
 from math import inf, nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from conftest import REPOSITORY, SHELL, recorded
+from test_history import report, save
 
 import thud
-from thud.base.files import inputs_folder
-from thud.explorer.jobs import INPUT_ERRORS, TASKS
-from thud.explorer.messages import describe_error
-from thud.explorer.server import new_application
+from thud.comparison.comparison import read_all
+from thud.export.force_files import blocked_force
 from thud.level.levels import peak_count
+from thud.recordings.config import read_config
+from thud.report.ball_history import read_history
+from thud.report.recording_files import read_picture
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
+    from thud.recordings.config import Config
+    from thud.report.ball_history import History
+
 # What is only imported for the table.
-__all__ = ["inf", "nan", "new_application", "np", "peak_count"]
+__all__ = [
+    "blocked_force", "inf", "nan", "np", "os", "peak_count", "read_all", "read_picture",
+]  # fmt: skip
 
 PULSE = np.sin(np.pi * np.linspace(0, 1, 883))
-RECORDINGS = inputs_folder() / "recordings"
-WAV = (RECORDINGS / "drop_1.wav").read_bytes()
-# Place of the length of its samples.
-LENGTH = WAV.index(b"data") + 4
-SHELL = {"model": {"name": "hollow_sphere"}}
-TRAVEL = "travel (mm),force (N)\n0,0\n1,2"
 
 
 def write(name: str, text: str | bytes) -> Path:
@@ -47,16 +53,45 @@ def assess(**change: Any) -> thud.Verdict:  # noqa: ANN401
     return thud.assess_levels(**({"levels": [39, 31, 23, 17, 12.5]} | change))
 
 
-def page(task: str, *arguments: Any) -> None:  # noqa: ANN401
-    """Run a task of the explorer; raise what its page says, and in brackets at which field."""
-    try:
-        TASKS[task](*arguments)
-    except INPUT_ERRORS as error:
-        report = describe_error(error)
-        message = f"{report['error']} [{report['field']}]"
-        raise thud.InputError(message) from error
+STANDARD = thud.solve()
+TYRE = replace(SHELL, name="tyre", limits=thud.Limits("tyre"))
+ROOM = thud.Room(positions="standard")
+CASE = REPOSITORY / "inputs/rubber_ball_100cm.nml"
+DROP = REPOSITORY / "inputs/recordings/drop_1.csv"
 
 
-def assessed(*files: Path, **table: Any) -> None:  # noqa: ANN401
-    """Let the page assess files of a recording, by default an example, with values of a table."""
-    page("recording", files or [write("a.wav", WAV)], table)
+@cache
+def below() -> thud.RoomPrediction:
+    """Return the level below a floor at the positions of the standard."""
+    return thud.predict_level(STANDARD, thud.Plate(thickness=0.18), ROOM)
+
+
+@cache
+def dropped(height: float) -> thud.Recording:
+    """Return a recording of a drop of known height."""
+    return recorded(STANDARD, height=height)
+
+
+def laboratory(text: str) -> Config:
+    """Return the configuration that a file states."""
+    return read_config(write("lab.toml", text))
+
+
+def copied(path: Path) -> Path:
+    """Copy a file into the directory of the test, with a link to it; return its path."""
+    Path("link.csv").symlink_to(path.name)
+    return Path(shutil.copy(path, path.name))
+
+
+def chart(**change: Any) -> History:  # noqa: ANN401
+    """Return the history by reports of which the second differs from the first."""
+    save(Path("y/report.json"), report("2029-01-01"))
+    save(Path("z/report.json"), report("2030-01-01", **change))
+    return read_history([Path()])
+
+
+def criteria(key: str, value: object) -> list[dict[str, Any]]:
+    """Return the criteria of a report with a wrong entry."""
+    rows: list[dict[str, Any]] = report("2030-01-01")["criteria"]
+    rows[2][key] = value
+    return rows

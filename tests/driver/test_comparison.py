@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import MINIMAL, REPOSITORY, naming, recorded
+from conftest import REPOSITORY, naming, recorded
 
 import thud
 from thud import cli
@@ -22,7 +22,7 @@ from thud.recordings.config import Config
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from conftest import CaseFile, ErrorsOf
+    from conftest import ErrorsOf
 
 STEPS = sorted((REPOSITORY / "inputs/comparison").glob("*.nml"))
 
@@ -156,18 +156,6 @@ def test_recordings_say_what_is_doubtful_and_have_their_names() -> None:
         assert all(note.subject in own.subject for note, own in zip(expected, found, strict=True))
 
 
-def test_heights_of_recordings_are_those_of_the_drop_within_their_limits(
-    shell: thud.Impact,
-) -> None:
-    low, high, other = (recorded(shell, height=height) for height in (0.99, 1.01, 0.9))
-    assert len(thud.compare([shell, low, high, recorded(shell)]).impacts) == 4
-    # v = sqrt(2 g h)
-    with pytest.raises(thud.InputError, match=naming("&drop: height", 4.429, 4.202)):
-        thud.compare([shell, other])
-    with pytest.raises(thud.InputError, match=naming("&drop: height", 4.407, 4.202)):
-        thud.compare([low, other])
-
-
 def test_recording_stands_beside_its_model(shell: thud.Impact, tmp_path: Path) -> None:
     write_recording(tmp_path / "plate.csv", shell)
     recording = thud.read_recording(
@@ -192,25 +180,6 @@ def test_verdict_on_a_record_is_open_where_its_ball_is_not_known(tmp_path: Path)
     assert recording.assess().conforms == "undecided"
 
 
-def test_nothing_and_different_drops_are_told(case_file: CaseFile, tmp_path: Path) -> None:
-    for impacts in ({}, np.ma.masked, None):
-        with pytest.raises((thud.InputError, TypeError), match=naming("impacts")):
-            thud.compare(impacts)  # type: ignore[arg-type]
-    with pytest.raises(thud.InputError, match=r"a\b.* 4\.429 m/s.* b\b.* 3\.132 m/s"):
-        thud.compare(
-            {
-                "a": thud.Case(model=thud.HollowSphere()),
-                "b": thud.solve(drop=thud.Drop(0.5), model="hollow_sphere"),
-            }
-        )
-    with pytest.raises(TypeError, match=naming("a", "int", "Case")):
-        thud.compare({"a": 1})  # type: ignore[dict-item]
-    (tmp_path / "other").mkdir()
-    paths = [case_file(MINIMAL), case_file(MINIMAL, "other/case.nml")]
-    with pytest.raises(thud.InputError, match=naming(paths[1], "'case'")):
-        read_all(paths)
-
-
 @pytest.mark.usefixtures("working_directory")
 def test_command_writes_the_page(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], errors_of: ErrorsOf
@@ -226,12 +195,6 @@ def test_command_writes_the_page(
     os.mkfifo(tmp_path / "pipe.csv")
     assert "pipe.csv" in errors_of("compare", "-q", "pipe.csv")
     assert "plate.csv" in errors_of("compare", "-q", "-o", "plate.csv", STEPS[0])
-
-
-def test_case_that_fails_is_named() -> None:
-    low = thud.Case(sampling=thud.Sampling(duration=0.01), model=thud.HollowSphere())
-    with pytest.raises(thud.InputError, match=naming("short", "&sampling: duration")):
-        thud.compare({"short": low})
 
 
 @pytest.mark.parametrize(

@@ -6,11 +6,11 @@ import html
 import math
 import re
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY, names_in, naming
+from conftest import REPOSITORY, names_in
 
 import thud
 from thud.base.bridge import ask
@@ -209,22 +209,6 @@ def test_command_compares_cases(
     assert not (tmp_path / "none").exists()
 
 
-@pytest.mark.parametrize(
-    ("cases", "words"),
-    [
-        ({}, naming("cases")),
-        ({"a": 1}, naming("a", "Case", "RoomPrediction")),
-        *(({"a": replace(CASES["thin"], **{missing: None})}, r"^a: ")
-          for missing in ("model", "floor")),
-        ({"short": replace(CASES["thin"], sampling=thud.Sampling(duration=0.01))},
-         r"^short: &sampling: duration"),
-    ],
-)  # fmt: skip
-def test_cases_without_a_level_in_a_room_are_refused(cases: Any, words: str) -> None:  # noqa: ANN401
-    with pytest.raises((thud.InputError, TypeError), match=words):
-        thud.compare_floors(cases)
-
-
 def test_synthetic_survey_gives_back_what_was_put_into_it(tmp_path: Path) -> None:
     """A survey made of the prediction, shifted by 2 dB, with scatter, background and decay."""
     prediction = thud.predict_level(thud.solve(), thud.Plate(), thud.Room())
@@ -246,38 +230,6 @@ def test_synthetic_survey_gives_back_what_was_put_into_it(tmp_path: Path) -> Non
     assert measured.standardized_rating is not None
     gap = measured.standardized_rating.a_weighted - prediction.ratings["standardized"].level
     assert gap == pytest.approx(2.0, abs=0.03)
-
-
-CEILINGS = [
-    entry
-    for entry in thud.constructions("ceiling").values()
-    if entry.room and isinstance(entry.floor, thud.Plate)
-]
-BARE = "bare plates, but this one has {}; allowed"
-
-
-@pytest.mark.parametrize(
-    ("floor", "room", "words"),
-    [
-        (thud.Plate(wave_speed=3500.0 / 1.27, density=2300.0), {}, "wave_speed/density"),
-        (thud.Plate(wave_speed=3500.0 * 1.27, density=2300.0), {}, "wave_speed/density"),
-        (thud.Plate(density=500.0), {}, naming("density", 7, 1.21, 1.92)),
-        (thud.Plate(stiffness_ratio=0.1), {}, naming("isotropic")),
-        (thud.Oscillator(), {}, naming("Oscillator")),
-        (thud.Plate(screed_thickness=0.05), {}, BARE.format("a floating floor")),
-        (thud.Plate(covering_stiffness=1e7), {}, BARE.format("a covering")),
-        (thud.Plate(covering_improvement=(5.0,) * 12), {}, BARE.format("a covering")),
-        (thud.Plate(subceiling_thickness=0.0125), {}, BARE.format("a subceiling")),
-        (thud.Plate(), {"ceiling_mass": 9.0}, BARE.format("a ceiling")),
-        *((entry, {}, "a ceiling") for entry in CEILINGS),
-    ],
-)
-def test_tapping_level_is_of_bare_plates_of_concrete(
-    floor: object, room: dict[str, float], words: str
-) -> None:
-    assert len(CEILINGS) > 1
-    with pytest.raises((thud.InputError, TypeError), match=words):
-        thud.tapping_level(floor, thud.Room(**room))  # type: ignore[arg-type]
 
 
 def test_rating_of_a_source_that_does_not_conform_is_marked() -> None:

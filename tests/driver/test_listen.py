@@ -245,27 +245,6 @@ def test_bands_that_cannot_be_reached_are_said(found: thud.RoomSound) -> None:
     assert not any(note.code == "sound_deviates" for note in found.notes)
 
 
-@pytest.mark.parametrize(
-    ("settings", "words"),
-    [
-        ({"pause": -1.0}, naming("pause", -1.0, 0, 60)),
-        ({"pause": float("nan")}, naming("pause")),
-        ({"seed": -1}, naming("seed", -1)),
-        ({"position": (0, 1)}, naming("ball", 0, 1, 5)),
-        ({"position": (1, 6)}, naming("microphone", 6, 1, 5)),
-        ({"position": 3}, naming("position", 3)),
-        ({"predictions": {}}, naming("predictions", "RoomPrediction")),
-        ({"predictions": {"slab": 1}}, naming("slab", "RoomPrediction")),
-        ({"predictions": [1]}, naming("predictions", "RoomPrediction")),
-    ],
-)
-def test_wrong_arguments_get_a_sentence(
-    predictions: dict[str, thud.RoomPrediction], settings: dict[str, object], words: str
-) -> None:
-    with pytest.raises((thud.InputError, TypeError), match=words):
-        thud.listen(**{"predictions": predictions["concrete"]} | settings)  # type: ignore[arg-type]
-
-
 def test_command_writes_a_file_and_says_what_it_is(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -32,12 +32,6 @@ def modulus(model: str, factor: float) -> float:
     return factor * STANDARD_BALL[model, "youngs_modulus"]
 
 
-@pytest.mark.parametrize("model", [thud.HollowSphere(), LINEAR])
-def test_nothing_is_known_to_vary_without_a_set(model: Any) -> None:  # noqa: ANN401
-    with pytest.raises(thud.InputError, match=naming("&unknowns", "modal_ball", "finite_element")):
-        thud.assess(thud.Case(model=model))
-
-
 @pytest.mark.parametrize("model", ["modal_ball", "finite_element"])
 def test_sets_are_those_of_the_standard_ball(model: str) -> None:
     verdict = thud.assess(thud.Case(model=MODELS[model]()))

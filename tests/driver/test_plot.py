@@ -60,14 +60,6 @@ def test_levels_show_the_tolerance_band(shell: thud.Impact, source: str) -> None
     np.testing.assert_array_equal(curves["ball"], shell.levels(force="floor"))
 
 
-def test_useless_impacts_are_refused() -> None:
-    for impacts in ({}, [], thud.solve()):
-        with pytest.raises((thud.InputError, TypeError), match=naming("impacts")):
-            thud.plot.force_history(impacts)  # type: ignore[arg-type]
-    with pytest.raises(TypeError, match=naming("ball", "int", "Impact")):
-        thud.plot.levels({"ball": 1})  # type: ignore[dict-item]
-
-
 def test_figures_are_a_column_wide_and_whole(tmp_path: Path) -> None:
     figure = thud.plot.levels({"a": thud.solve(), "b": thud.solve(drop=thud.Drop(0.1))}, "floor")
     assert figure.get_figwidth() == pytest.approx(WIDTH)
@@ -157,13 +149,6 @@ def test_loss_factors_follow_their_laws() -> None:
     power = np.array([10 / 74, 1000 / 74]) ** 0.75
     expected = 0.2 * power / (1 + 0.2 / np.tan(0.375 * np.pi) * (power - 1))
     np.testing.assert_allclose(fractional[[0, -1]], expected, rtol=0.02)
-
-
-def test_figures_without_snapshots_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(thud.InputError, match=naming("snapshot_interval", 0)):
-        thud.plot.motion(thud.solve())
-    with pytest.raises(thud.InputError, match=naming("ball.mp4", "gif")):
-        thud.plot.animate(thud.solve(), tmp_path / "ball.mp4")
 
 
 def test_case_has_the_figures_of_its_results(deformed: thud.Impact) -> None:
