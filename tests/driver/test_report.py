@@ -10,13 +10,16 @@ import re
 import shutil
 import subprocess
 import sys
-from dataclasses import replace
+import textwrap
+from dataclasses import fields, replace
+from html.parser import HTMLParser
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY, names_in, naming
-from markupsafe import escape
+from conftest import REPOSITORY, naming
+from hypothesis import given, settings, strategies as st
 from matplotlib import font_manager
 from scipy.special import stdtrit
 from synthetic import make_recording, with_force
@@ -30,7 +33,8 @@ from thud.level.assessment import Criterion, criterion_quantity
 from thud.level.estimate import NORMAL_FACTOR, Contribution, Estimate
 from thud.level.levels import low_pass
 from thud.plot.recording_figures import recording_forces, recording_levels
-from thud.recordings.config import Config, read_config
+from thud.plot.templates import plain
+from thud.recordings.config import Config, Instrument, Properties, ReportConfig, read_config
 from thud.recordings.instruments import Plate
 from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.recording import Recording, read_recording
@@ -43,14 +47,13 @@ from thud.report.contents import (
     report_criteria,
     report_data,
 )
-from thud.report.notes import group_notes
 from thud.report.page import BUDGET_HEAD, range_picture, report_page
 from thud.report.pdf import html_to_pdf, missing_characters
-from thud.report.recording_files import file_names, read_picture, table, write_report
-from thud.report.rows import criterion_row, drop_table, excluded_text, freedom_text, risk_text
+from thud.report.recording_files import file_names, read_picture, write_report
+from thud.report.rows import criterion_row, drop_table, freedom_text, risk_text
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from collections.abc import Callable
 
 UNKNOWN = Estimate(float("nan"), float("nan"))
 LAB = Config(
@@ -63,6 +66,7 @@ LAB = Config(
     height=1.0,
 )
 HOSTILE = '<script>alert("a&b")</script>\u202e\x07\udcff$x^{$'
+MARK = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><path d="M0 0h9v9z"/></svg>'
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +103,7 @@ def many(one: Recording, count: int, **config: Any) -> Recording:  # noqa: ANN40
     return Recording("many", tuple(drops), tuple(origins), replace(LAB, **config), 0.01)
 
 
-def test_page_says_that_the_background_does_not_count(one: Recording) -> None:
+def test_background_does_not_count(one: Recording) -> None:
     (drop,) = one.drops
     first, stop = drop.gate
     force = np.full_like(drop.force, 500.0)
@@ -112,27 +116,77 @@ def test_page_says_that_the_background_does_not_count(one: Recording) -> None:
     contact_time = drop.contact_time.value
     assert -3e-3 < drop.time[first] < 0
     assert contact_time < drop.time[stop - 1] < contact_time + 3e-3
-    text = "from first touch to release, with a margin for their uncertainty; zero outside"
-    assert text in words_of(one)
+
+
+@pytest.fixture(scope="module")
+def laboratory(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    """Return the recording of the laboratory of the repository, with all that it can state."""
+    mark = tmp_path_factory.mktemp("laboratory") / "mark.svg"
+    mark.write_text(MARK)
+    folder = REPOSITORY / "inputs/recordings"
+    config = read_config(folder / "lab.toml")
+    report = replace(
+        config.report, address=("Street 1", "Town"), state="no cracks", place="Hall 3",
+        traceability="to the SI by K-1", deviations="three drops only", accreditation="Body, no. 1",
+        accreditation_mark=str(mark), authorized_by="E. Muster",
+    )  # fmt: skip
+    properties = replace(
+        config.properties, wall_thickness=0.0301, hardness="41 Shore A", surface="clean",
+        temperature=20.8,
+    )  # fmt: skip
+    instruments = (
+        Instrument("Force plate", "123", "K-1", calibrated="2026-01-02", due="2027-01-02"),
+        Instrument("Amplifier", due="2026-01-05"),
+    )
+    stated = {"report": report, "properties": properties, "instruments": instruments}
+    return read_recording(folder / "three_drops.flac", config=replace(config, **stated))
+
+
+def noted(parts: tuple[Any, ...], *notes: tuple[Note, ...]) -> tuple[Any, ...]:
+    """Return drops or files with notes of the first of them."""
+    return (*map(lambda part, own: replace(part, notes=own), parts, notes), *parts[len(notes) :])
+
+
+def sixty_drops(one: Recording) -> Recording:
+    """Return a recording of heavy drops with an outlier, notes and a plate, and files left out."""
+    base = many(one, 60, mass=2.8, height=0.9, plate=Plate(f0=1600.0, Q=20.0, full_scale=6000.0))
+    hum = [Note("hum_removed", value=x, unit="N", others={"frequency": 50.0}) for x in (12, -3.5)]
+    offset = Note("offset_removed", value=4.0, unit="N")
+    left_out = tuple(
+        Note("drop_left_out", value=i, others={"time": i / 2, "reason": "touched the rim"})
+        for i in (2, 5, 6, 7)
+    )
+    overdue = Note("calibration_overdue", "amplifier", others={"due": "2020-01-01"})
+    drops = noted(base.drops, (hum[0], Note("peaks_unknown")), (hum[1], offset), ())
+    return replace(base, drops=drops, origins=noted(base.origins, (*left_out, overdue)))
+
+
+def hostile(one: Recording) -> Recording:
+    """Return a recording whose texts are code."""
+    # A configuration refuses characters that no page shows; files may hold them.
+    line = "".join(filter(str.isprintable, HOSTILE))
+    texts = dict.fromkeys(("laboratory", "ball", "serial"), line)
+    base = many(one, 2, **texts, instruments=(line, line))
+    notes = (Note("plate_unknown", others={"what": HOSTILE, "keys": ""}),)
+    drops = tuple(replace(d, name=HOSTILE + d.name, notes=notes) for d in base.drops)
+    origins = tuple(replace(o, name=HOSTILE, calibration=HOSTILE) for o in base.origins)
+    return replace(base, drops=drops, origins=origins)
 
 
 def crowded(one: Recording) -> Recording:
     """Return a recording whose names, lists and sentences are as long as they can be."""
-    base = many(one, 500, laboratory="W" * 500, ball="ball " * 100, serial="1 x" * 160,
+    base = many(one, 65, laboratory="W" * 500, ball="ball " * 100, serial="1 x" * 160,
                 instruments=tuple(f"Instrument {i} " + "y" * 300 for i in range(40)))  # fmt: skip
-    drops = [
-        replace(
-            drop,
-            name=f"a_long_name_of_a_file_{i}" + "z" * 200,
-            notes=tuple(
-                Note(code, value=i, others={name: chr(97 + k) + " a long one" * 20, **rest})
-                for k in range(20)
-                for code, name, rest in (
-                    ("drop_left_out", "reason", {"time": i}),
-                    ("plate_unknown", "what", {"keys": ""}),
-                )
-            ),
+    notes = tuple(
+        Note(code, value=k, others={name: chr(97 + k) + " a long one" * 20, **rest})
+        for k in range(20)
+        for code, name, rest in (
+            ("drop_left_out", "reason", {"time": k}),
+            ("plate_unknown", "what", {"keys": ""}),
         )
+    )
+    drops = [
+        replace(drop, name=f"a_long_name_of_a_file_{i}" + "z" * 200, notes=notes)
         for i, drop in enumerate(base.drops)
     ]
     origins = [
@@ -142,20 +196,95 @@ def crowded(one: Recording) -> Recording:
     return replace(base, drops=tuple(drops), origins=tuple(origins))
 
 
-def unknown(one: Recording) -> Recording:
+def one_drop(one: Recording) -> Recording:
     """Return a recording of which nothing is known but the force."""
     drop = replace(one.drops[0], restitution=UNKNOWN, restitutions={})
-    return Recording("unknown", (drop,), one.origins)
+    return Recording("one", (drop,), one.origins)
 
 
-KINDS = {
-    "one": lambda one: one,
-    "five": lambda one: many(one, 5),
-    "500": lambda one: many(one, 500),
-    "crowded": crowded,
-    "unknown": unknown,
-    "failing": lambda one: many(one, 3, mass=2.8, height=0.9, serial="x" * 500),
-}
+@pytest.fixture(scope="module")
+def recordings(one: Recording, laboratory: Recording) -> dict[str, Recording]:
+    """Return the recordings of which reports are written."""
+    makers = (one_drop, sixty_drops, hostile, crowded)
+    return {"laboratory": laboratory, **{make.__name__: make(one) for make in makers}}
+
+
+def words_of(page: str) -> str:
+    """Return the text of a page, a line for each paragraph and row, numbers to three digits."""
+    page = re.sub("<style>.*?</style>|<svg.*?</svg>", "", " ".join(page.split()))
+    page = re.sub("<br>|</(?:h[1-6]|li|p|title|tr)>", "\n", re.sub("</t[dh]>", "|", page))
+    text = html.unescape(re.sub("<[^>]*>", " ", page)).replace(thud.__version__, "VERSION")
+    text = re.sub(r"\b[0-9a-f]{64}\b", "CHECKSUM", text)
+    text = re.sub(r"\d+\.\d+", lambda number: f"{float(f'{float(number[0]):.3g}'):g}", text)
+    lines = (" ".join(line.split()).rstrip("| ") for line in text.split("\n"))
+    return "\n".join(textwrap.fill(line, 100, subsequent_indent="  ") for line in lines if line)
+
+
+@pytest.mark.parametrize("kind", ["one_drop", "laboratory", "sixty_drops", "hostile"])
+def test_page_is_approved(
+    kind: str, recordings: dict[str, Recording], approved: Callable[[str, str], None]
+) -> None:
+    page = report_page(report_data(recordings[kind]))
+    approved(f"report_{kind}.txt", words_of(page))
+    text = re.sub("<style>.*?</style>", "", page, flags=re.DOTALL)
+    assert not re.search(r"\b(?:nan|None|inf)\b", text)
+    # Units stay with their numbers.
+    assert not re.findall(r"\d (?:dB|Hz|N|ms|kHz|m|kg|%|°C)\b", text)
+
+
+class Skeleton(HTMLParser):
+    """The tags of a page, with the names of their attributes, but breaks of lines."""
+
+    def __init__(self, page: str) -> None:
+        """Read a page."""
+        super().__init__()
+        self.tags: list[tuple[str, ...]] = []
+        self.feed(page)
+        style = page.partition("<style>")[2].partition("</style>")[0]
+        # A string of CSS has letters, digits, blanks and escapes.
+        self.style = re.sub(r'"Report (?:[A-Za-z0-9 ]|\\[0-9a-f]+ )*"', "", style)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Keep a tag."""
+        self.tags += [(tag, *(name for name, _ in attrs))] * (tag != "br")
+
+    def handle_endtag(self, tag: str) -> None:
+        """Keep the end of an element."""
+        self.tags += [(f"/{tag}",)]
+
+
+DATES = {"date", "received", "issued", "calibrated", "due"}
+MARKUP = ["</", "<", ">", '"', "'", "&lt;", "script", "style", "{{", "}}", "{%", "-->", "\\"]
+
+
+def filled(kind: type, text: str) -> Any:  # noqa: ANN401 - of the kind
+    """Return what a laboratory states, with a text in every key that takes one."""
+    kinds = {"str": text, "tuple[str, ...]": (text, text)}
+    keys = {f.name: kinds[f.type] for f in fields(kind) if f.type in kinds and f.name not in DATES}
+    return kind(**keys)
+
+
+def page_of(one: Recording, text: str) -> tuple[str, dict[str, Any]]:
+    """Return page and data of a report with a text wherever a user can state one."""
+    line = "".join(filter(str.isprintable, text)).strip() or "x"
+    parts = {"report": filled(ReportConfig, line), "properties": filled(Properties, line)}
+    config = replace(filled(Config, line), instruments=(filled(Instrument, line),) * 2, **parts)
+    notes = (Note("plate_unknown", text, others={"what": text, "keys": text}),)
+    (drop,), (origin,) = one.drops, one.origins
+    drops = (replace(drop, name=text, notes=notes, restitutions={text: drop.restitution}),)
+    origins = (replace(origin, name=text, calibration=text, date=text, notes=notes),)
+    recording = Recording(text, drops, origins, config)
+    data = data_of(recording)
+    assert data["laboratory"] == line
+    return report_page(report_data(recording)), data
+
+
+@settings(max_examples=25, deadline=None)
+@given(text=st.lists(st.sampled_from(MARKUP) | st.characters(), max_size=12).map("".join))
+def test_no_text_is_markup(one: Recording, text: str) -> None:
+    page, expected = (Skeleton(page_of(one, entry)[0]) for entry in (text, "x"))
+    assert page.tags == expected.tags
+    assert page.style == expected.style
 
 
 @pytest.fixture(scope="module")
@@ -166,13 +295,15 @@ def weasyprint() -> None:
     )
 
 
-@pytest.fixture(scope="module", params=KINDS)
+@pytest.fixture(scope="module", params=["one_drop", "laboratory", "hostile", "crowded"])
 def written(
-    request: pytest.FixtureRequest, one: Recording, tmp_path_factory: pytest.TempPathFactory
+    request: pytest.FixtureRequest,
+    recordings: dict[str, Recording],
+    weasyprint: None,  # noqa: ARG001
+    tmp_path_factory: pytest.TempPathFactory,
 ) -> tuple[Recording, Path]:
     """Write the report of a recording of each kind."""
-    request.getfixturevalue("weasyprint")
-    recording = KINDS[request.param](one)
+    recording = recordings[request.param]
     folder = tmp_path_factory.mktemp("written")
     paths = write_report(recording, folder)
     assert [path.name for path in paths] == file_names()
@@ -237,12 +368,13 @@ def test_each_page_has_its_number_and_that_of_the_report(written: tuple[Recordin
     pages = [page.get_textpage().get_text_bounded() for page in open_pdf(folder / "report.pdf")]
     for i, text in enumerate(pages, 1):
         assert f"page {i} of {len(pages)}" in text
-        name = recording.config.serial or recording.name
-        assert f"Report of {name[:50]}" in " ".join(text.split())
+        name = plain(recording.config.serial or recording.name)
+        number = recording.config.report.number or f"of {name[:50]}"
+        assert f"Report {number}" in " ".join(text.split())
     assert "end of report" in pages[-1]
     assert "Signature" in pages[-1]
-    # Five drops fill two sheets; only crowded recordings need many.
-    assert len(pages) <= (2 if len(recording.drops) < 10 else 15)
+    # Two drops fill two sheets; only crowded recordings need many.
+    assert len(pages) <= min(max(2, len(recording.drops)), 15)
 
 
 @pytest.mark.slow
@@ -328,50 +460,14 @@ def test_date_is_that_of_the_files(one: Recording) -> None:
 
 @pytest.mark.parametrize(
     "text",
-    [
-        "2024-05-03",
-        "2024-05-03T10:11:12.123456Z",
-        "03.05.2024 10:11",
-        "2024/05/03",
-        "03-MAY-24   10:11:12",
-    ],
-)
+    ["2024-05-03", "2024-05-03T10:11:12.123456Z", "03.05.2024 10:11", "2024/05/03",
+     "03-MAY-24   10:11:12"],
+)  # fmt: skip
 def test_dates_of_many_kinds_are_read(text: str) -> None:
     found = read_date(text)
     assert found is not None
     assert found.date().isoformat() == "2024-05-03"
     assert read_date("3/5/24") is None
-
-
-@pytest.mark.usefixtures("weasyprint")
-def test_names_are_no_code(one: Recording, tmp_path: Path) -> None:
-    # A configuration refuses characters that no page shows; files may hold them.
-    line = "".join(filter(str.isprintable, HOSTILE))
-    texts = dict.fromkeys(("laboratory", "ball", "serial"), line)
-    recording = many(one, 2, **texts, instruments=(line, line))
-    hostile = (Note("plate_unknown", others={"what": HOSTILE, "keys": ""}),)
-    drops = tuple(replace(d, name=HOSTILE + d.name, notes=hostile) for d in recording.drops)
-    origins = tuple(replace(o, name=HOSTILE, calibration=HOSTILE) for o in recording.origins)
-    write_report(replace(recording, drops=drops, origins=origins), tmp_path)
-    page = (tmp_path / "report.html").read_text()
-    assert "<script" not in page
-    script = str(escape('<script>alert("a&b")</script>'))
-    assert page.count(script) > 6
-    assert f"{script}\ufffd\ufffd\ufffd$x^{{$" in page
-    assert '<script>alert("a&b")</script>' in text_of(tmp_path / "report.pdf")
-    assert json.loads((tmp_path / "report.json").read_text())["serial"] == line
-
-
-@pytest.mark.usefixtures("weasyprint")
-def test_what_is_not_known_is_said(one: Recording, tmp_path: Path) -> None:
-    write_report(unknown(one), tmp_path)
-    words = text_of(tmp_path / "report.pdf")
-    lines = ("Laboratory", "Ball", "Serial number", "Measured on", "Temperature", "Instruments")
-    rows = ("Restitution", "Mass, kg", "Drop height, m")
-    for text in (*(f"{n} not known" for n in lines), *(f"{n} not known – " for n in rows)):
-        assert text in words
-    assert "uncertainty not stated" in words
-    assert not re.search(r"\bnan\b|\bNone\b|\binf\b", words)
 
 
 @pytest.mark.parametrize("library", [None, "raise OSError('no libpango')"])
@@ -412,28 +508,6 @@ def test_missing_font_is_told(
     assert missing_characters("a 建") == "建"
 
 
-@pytest.mark.filterwarnings("ignore::thud.base.errors.ReportWarning")
-def test_report_replaces_no_file_of_others(one: Recording, tmp_path: Path) -> None:
-    (tmp_path / "notes.txt").write_text("mine")
-    with pytest.raises(TypeError, match=naming("recording", "int")):
-        thud.write_report(5, tmp_path)  # type: ignore[arg-type]
-    for name in ("a\0b", "a\nb"):
-        with pytest.raises(thud.InputError, match="one line"):
-            thud.write_report(one, tmp_path / name)
-    for also in (False, True):
-        with pytest.raises(thud.InputError, match=naming(tmp_path)):
-            thud.write_report(one, tmp_path, replace=also)
-    assert names_in(tmp_path) == ["notes.txt"]
-
-
-@pytest.mark.usefixtures("weasyprint")
-def test_equal_recordings_give_equal_pages(one: Recording, tmp_path: Path) -> None:
-    for name in "ab":
-        write_report(one, tmp_path / name)
-    for name in ("report.json", "report.html"):
-        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
-
-
 @pytest.mark.parametrize("count", [1, 3, 60])
 def test_figures_show_every_drop_the_average_and_the_limits(one: Recording, count: int) -> None:
     recording = many(one, count)
@@ -470,149 +544,31 @@ def test_levels_of_all_bands_have_the_same_contributions(one: Recording) -> None
         ]  # fmt: skip
 
 
-STATED = """
-laboratory = "Laboratory"
-date = 2024-05-03
-mass = 2.5
-mass_uncertainty = 0.002
-height = 1.0
-height_uncertainty = 0.003
-calibration_uncertainty = 0.005
-unit = "N"
-[report]
-number = "2024-17"
-address = ["Street 1", "Town"]
-client = ["Client & Co.", "Their town"]
-item = "hollow ball"
-state = "no cracks"
-received = 2024-04-30
-issued = "06.05.2024"
-place = "Hall 3"
-procedure = "P-17, edition 4"
-deviations = "four drops only"
-humidity = 45.4
-pressure = 101325.0
-accreditation = "Body, no. 1"
-accreditation_mark = "mark.svg"
-authorized_by = "E. Muster"
-[properties]
-diameter = 0.1803
-wall_thickness = 0.0301
-hardness = "41 Shore A"
-surface = "clean"
-temperature = 20.8
-[[instruments]]
-name = "Force plate"
-serial = "123"
-certificate = "K-1"
-calibrated = 2024-01-10
-due = 2025-01-10
-[[instruments]]
-name = "Amplifier"
-due = 2024-05-02
-"""
-MARK = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 9 9"><path d="M0 0h9v9z"/></svg>'
-
-
-def stated(one: Recording, folder: Path, text: str = STATED) -> Recording:
-    """Return a recording with everything that a laboratory can state."""
-    (folder / "mark.svg").write_text(MARK)
-    (folder / "lab.toml").write_text(text)
-    return replace(many(one, 5), config=read_config(folder / "lab.toml"))
-
-
-def words_of(recording: Recording) -> str:
-    """Return the text of the page of a recording."""
-    page = report_page(report_data(recording))
-    text = re.sub(r"<style>.*?</style>|<svg.*?</svg>|<[^>]*>", " ", page, flags=re.DOTALL)
-    return " ".join(html.unescape(text).split())
-
-
-def test_page_states_what_the_laboratory_states(one: Recording, tmp_path: Path) -> None:
-    recording = stated(one, tmp_path)
-    data = report_data(recording)
-    page = report_page(data, [], read_picture(tmp_path / "mark.svg"))
-    words = words_of(recording)
-    for text in (
-        "Calibration report 2024-17", "Address Street 1 Town", "Client Client & Co. Their town",
-        "Item hollow ball", "State of the item no cracks", "Received on 2024-04-30",
-        "Measured on 2024-05-03", "Issued on 2024-05-06", "Place Hall 3",
-        "Procedure P-17, edition 4", "Deviations four drops only", "Humidity 45 %",
-        "Air pressure 1013 hPa", "Accreditation Body, no. 1",
-        "Force plate, no. 123, certificate K-1 of 2024-01-10, due 2025-01-10",
-        "diameter 180.3 mm (standards: 180 mm as an example, no tolerance)",
-        "wall thickness 30.1 mm (standards: 30 mm as an example, no tolerance)",
-        "hardness 41 Shore A", "surface clean", "temperature 20.8 °C",
-        "Hall 3, 2024-05-06 Place and date E. Muster Authorized by Signature",
-        "The results relate only to the item tested.",
-        "Amplifier: its calibration was due on 2024-05-02, before the measurement",
-    ):  # fmt: skip
-        assert text in words, text
+def test_mark_is_in_the_page_and_its_path_nowhere(laboratory: Recording) -> None:
+    data, path = report_data(laboratory), Path(laboratory.config.report.accreditation_mark)
+    page = report_page(data, [], read_picture(path))
     (image,) = re.findall(r'<img[^>]*src="data:image/svg\+xml;base64,([^"]*)"', page)
     assert base64.b64decode(image).decode() == MARK
-    assert r'content: "Report 2024\2d 17"' in page
-    content = json_bytes(data).decode()
-    assert json.loads(content)["report"]["accreditation_mark"] == "mark.svg"
-    assert str(tmp_path) not in content
+    assert str(path.parent) not in page + json_bytes(data).decode()
 
 
 def test_what_iso_17025_asks_for_and_is_not_stated_is_listed(
-    one: Recording, tmp_path: Path
+    one: Recording, laboratory: Recording
 ) -> None:
-    recording = stated(one, tmp_path)
-    missing = missing_keys(recording.config, recording.origins)
-    assert missing == [
-        "ball", "serial", "traceability", "temperature", "instruments: certificate",
-    ]  # fmt: skip
-    text = STATED.replace("procedure =", 'traceability = "to the SI by K-1"\nprocedure =')
-    traceable = stated(one, tmp_path, text)
-    missing.remove("traceability")
-    assert missing_keys(traceable.config, traceable.origins) == missing
-    assert "Traceability to the SI by K-1" in words_of(traceable)
-    nothing = missing_keys(Config(), one.origins)
-    assert nothing == [*REQUIRED, "instruments"]
+    config, origins = laboratory.config, laboratory.origins
+    assert missing_keys(config, origins) == ["instruments: certificate"]
+    for key in ("traceability", "place"):
+        lacking = replace(config, report=replace(config.report, **{key: ""}))
+        assert missing_keys(lacking, origins) == [key, "instruments: certificate"]
+    assert missing_keys(Config(), one.origins) == [*REQUIRED, "instruments"]
     # The files have dates.
     assert "date" not in missing_keys(Config(), many(one, 2).origins)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ("2024-04-30", '"soon"', naming("report: received", "'soon'", "2024-05-03")),
-        ("humidity = 45.4", "humidity = 145", naming("report: humidity", "145", "100")),
-        ("humidity = 45.4", "humidity = 0.454", naming("report: humidity", "0.454", "1 to 100")),
-        ("pressure = 101325.0", "pressure = 1013", naming("report: pressure", "1013", "50000")),
-        ("number =", "nummer =", naming("report", "'nummer'", "number")),
-        ("certificate =", "zertifikat =", naming("instruments", "'zertifikat'", "certificate")),
-        ("diameter = 0.1803", "diameter = 180.3", naming("properties: diameter", "180.3")),
-    ],
-)
-def test_wrong_fields_of_the_report_are_refused(
-    one: Recording, tmp_path: Path, old: str, new: str, words: str
-) -> None:
-    with pytest.raises(thud.InputError, match=words):
-        stated(one, tmp_path, STATED.replace(old, new))
-
-
-@pytest.mark.parametrize(
-    ("mark", "words"), [("none.svg", (".svg", ".png", "300 kB")), ("lab.toml", ("no picture",))]
-)
-def test_marks_that_are_no_pictures_are_refused(
-    one: Recording, tmp_path: Path, mark: str, words: tuple[str, ...]
-) -> None:
-    recording = stated(one, tmp_path, STATED.replace("mark.svg", mark))
-    with pytest.raises(thud.InputError, match=naming("accreditation_mark", mark, *words)):
-        write_report(recording, tmp_path / "report")
-
-
-def test_budgets_combine_to_the_uncertainty(one: Recording, tmp_path: Path) -> None:
-    recording = stated(one, tmp_path)
-    data = data_of(recording)
-    words = words_of(recording)
-    for entry in data["criteria"]:
+def test_budgets_combine_to_the_uncertainty(laboratory: Recording) -> None:
+    criteria = {entry["name"]: entry for entry in data_of(laboratory)["criteria"]}
+    for entry in filter(lambda entry: entry["uncertainty"], criteria.values()):
         parts = [part for part in entry["contributions"] if part["counted"]]
-        if not entry["uncertainty"]:
-            continue
         combined = np.sqrt(sum(part["uncertainty"] ** 2 for part in parts))
         assert combined == pytest.approx(entry["uncertainty"])
         for part in entry["contributions"]:
@@ -620,22 +576,20 @@ def test_budgets_combine_to_the_uncertainty(one: Recording, tmp_path: Path) -> N
             size = part["uncertainty"] * part["divisor"] if part["size"] is None else part["size"]
             product = size / part["divisor"] * part["sensitivity"]
             assert product == pytest.approx(part["uncertainty"])
-    (level,) = [entry for entry in data["criteria"] if entry["name"] == "octave_31_5"]
+    level = criteria["octave_31_5"]
     parts = {part["name"]: part for part in level["contributions"]}
-    assert [parts[name]["kind"] for name in ("repeatability", "noise", "calibration")] == [
-        "A", "A", "B"
-    ]  # fmt: skip
-    assert parts["repeatability"]["divisor"] == pytest.approx(np.sqrt(5))
-    assert parts["calibration"]["size"] == 0.01
+    kinds = [parts[name]["kind"] for name in ("repeatability", "noise", "calibration")]
+    assert kinds == ["A", "A", "B"]
+    assert parts["repeatability"]["divisor"] == pytest.approx(np.sqrt(3))
+    assert parts["calibration"]["size"] == 0.005
     # One percent of the force is 20 lg(e)/100 dB.
     assert parts["calibration"]["sensitivity"] == pytest.approx(20 / np.log(10))
-    share = 100 * (parts["calibration"]["uncertainty"] / level["uncertainty"]) ** 2
-    assert f"calibration B 0.010 1 8.7 dB 0.087 dB ∞ {share:.1f} %" in words
-    k = level["coverage_factor"]
-    assert f"degrees of freedom {level['freedom']:.4g}; k = {k:.2f}" in words
-    (mass,) = [entry for entry in data["criteria"] if entry["name"] == "mass"]
-    assert mass["contributions"][0]["uncertainty"] == 0.002
-    assert "Mass: 2.5000 ± 0.0039 kg; u = 0.0020 kg; degrees of freedom ∞; k = 1.96" in words
+    assert criteria["mass"]["contributions"][0]["uncertainty"] == 0.002
+    # Rectangular distributions have their half width.
+    parts = {part["name"]: part for part in criteria["restitution"]["contributions"]}
+    for name, size, unit in (("slow release", 5e-4, "s"), ("deformed ball", 4e-3, "m")):
+        assert (parts[name]["size"], parts[name]["unit"]) == (size, unit)
+        assert parts[name]["divisor"] == pytest.approx(np.sqrt(3))
 
 
 def test_degrees_of_freedom_and_risks_are_bounds_where_they_round() -> None:
@@ -663,63 +617,15 @@ def test_uncertainties_that_lack_contributions_are_marked(one: Recording) -> Non
     assert lacking["mass"] == ["mass"]
     assert lacking["drop_height"] == ["drop height"]
     assert lacking["peak_count"] == []
-    note = excluded_text(report_criteria(one))
-    assert note.startswith(
-        "† U excludes calibration, mass, drop height (uncertainty not stated: undecided); scatter "
-        "between drops (unknown from one drop). Stated standard uncertainties that decide:"
-    )
-    assert note in words_of(one)
-    assert "U is incomplete where it is marked †" in words_of(one)
-    marked = [row[0] for row in table(report_criteria(one))[1:] if row[2].endswith(" †")]
-    assert len(marked) == 9
-    assert "Force peaks" not in marked
 
 
-def test_complete_uncertainties_are_not_marked(one: Recording, tmp_path: Path) -> None:
-    recording = stated(one, tmp_path)
-    assert not any(excluded(recording).values())
-    assert excluded_text(report_criteria(recording)) == ""
-    assert "†" not in report_page(report_data(recording))
+def test_complete_uncertainties_are_not_marked(one: Recording, laboratory: Recording) -> None:
+    assert not any(excluded(laboratory).values())
     # An effective mass has the uncertainties of its origins.
     effective = replace(many(one, 1), config=replace(LAB, mass=None), calibration_uncertainty=None)
     assert set(excluded(effective)["mass"]) <= {"calibration", "drop height", SCATTER}
     plate = Plate(f0=1600.0, Q=20.0)
     assert excluded(many(one, 5, plate=plate))["octave_500"] == ["resonance of the plate"]
-
-
-def test_rectangular_distributions_have_their_half_width_and_divisor() -> None:
-    folder = REPOSITORY / "inputs/recordings"
-    drops = read_recording(folder / "three_drops.flac", config=read_config(folder / "lab.toml"))
-    (entry,) = [e for e in data_of(drops)["criteria"] if e["name"] == "restitution"]
-    parts = {part["name"]: part for part in entry["contributions"]}
-    for name, size, unit in (("slow release", 5e-4, "s"), ("deformed ball", 4e-3, "m")):
-        part = parts[name]
-        assert (part["size"], part["unit"]) == (size, unit)
-        assert part["divisor"] == pytest.approx(np.sqrt(3))
-        product = part["size"] / part["divisor"] * part["sensitivity"]
-        assert product == pytest.approx(part["uncertainty"])
-
-
-@pytest.mark.parametrize(
-    ("config", "words"),
-    [
-        # The index of L_FE is in an element of its own.
-        (LAB, ("Verdict Force exposure level L FE , dB re 1 N, 1 s 31.5 Hz, dB",
-               "the repeatability in the budgets is that of the mean energy",
-               "guard bands w = U (ILAC-G8:09/2019", "JCGM 106:2012", "JIS A 1418-2:2019",
-               "ISO 10140-5:2021 (table F.1)", "ISO 16283-2:2020", "published transcription",
-               "more than 10 % of its greatest value", "probability of a false acceptance",
-               "1 outlier (Grubbs, 5 %), marked but not excluded")),
-        (replace(LAB, plate=Plate(full_scale=6000.0)), ("the plate reads up to 6000 N",)),
-    ],
-)  # fmt: skip
-def test_page_names_measurand_rules_standards_plate_and_outliers(
-    one: Recording, config: Config, words: tuple[str, ...]
-) -> None:
-    recording = replace(many(one, 60), config=config)
-    assert recording.outliers
-    page = words_of(recording)
-    assert not [text for text in (*words, *map(str, recording.outliers)) if text not in page]
 
 
 def criterion(
@@ -771,75 +677,32 @@ def test_criterion_is_a_row_of_text(
     assert marked[6:8] == ("–", "–")
 
 
-def test_report_lists_single_drops_and_units_stay_with_numbers(one: Recording) -> None:
+def test_report_lists_single_drops(one: Recording) -> None:
     recording = many(one, 3)
-    data = report_data(recording)
-    head, *rows = drop_table(recording)
+    _, *rows = drop_table(recording)
     levels = recording.average().drops.level
     assert [row[0] for row in rows] == [drop.name for drop in recording.drops]
     for row, drop, own in zip(rows, recording.drops, levels, strict=True):
         assert row[-5:] == tuple(f"{level:.2f}" for level in own)
         assert row[-6] == f"{drop.peak_force.value:.0f}"
         assert float(row[2].split()[0]) == pytest.approx(1e3 * drop.contact_time.value, abs=6e-3)
-    words = words_of(recording)
-    assert " ".join(head) in words
-    assert " ".join(rows[1]) in words
-    page = re.sub(r"<style>.*?</style>", "", report_page(data), flags=re.DOTALL)
-    assert re.findall(r"\d (?:dB|Hz|N|ms|kHz|m|kg|%|°C)\b", page) == []
 
 
-def test_warnings_and_drops_left_out_stand_before_the_table(one: Recording) -> None:
-    note = Note("drop_left_out", value=2, others={"time": 1.0, "reason": "touched the rim"})
-    overdue = Note("calibration_overdue", "amplifier", others={"due": "2020-01-01"})
-    origin = replace(one.origins[0], notes=(note, overdue))
-    words = words_of(replace(one, origins=(origin,)))
-    before, _, after = words.partition("Criterion Value")
-    assert "left out: drop 2 at 1.00 s, touched the rim" in before
-    assert "its calibration was due on 2020-01-01" in before
-    assert "left out" not in after
-
-
-def test_contributions_of_nothing_are_no_rows_of_a_budget(one: Recording, tmp_path: Path) -> None:
-    recording = stated(one, tmp_path)
-    shares = re.findall(r'data-label="Share">([^<]*)<', report_page(report_data(recording)))
+def test_contributions_of_nothing_are_no_rows_of_a_budget(laboratory: Recording) -> None:
+    shares = re.findall(r'data-label="Share">([^<]*)<', report_page(report_data(laboratory)))
     assert shares
     assert "0.0\N{NO-BREAK SPACE}%" not in shares
-    level = report_criteria(recording)[0].criterion.estimate
+    level = report_criteria(laboratory)[0].criterion.estimate
     sizes = [part.uncertainty / level.uncertainty for part in level.contributions]
     assert any(0 < size < 0.01 for size in sizes)
 
 
 @pytest.mark.slow
-def test_budgets_scroll_inside_a_narrow_page(one: Recording, tmp_path: Path) -> None:
-    html = report_page(report_data(stated(one, tmp_path)))
-    with open_in_browser(tmp_path / "report.html", html) as page:
+def test_budgets_scroll_inside_a_narrow_page(laboratory: Recording, tmp_path: Path) -> None:
+    source = report_page(report_data(laboratory))
+    with open_in_browser(tmp_path / "report.html", source) as page:
         for width in (390, 1000):
             assert_scrolls_inside(page, page.locator(".budget"), width)
-
-
-def test_notes_that_differ_in_numbers_are_one_sentence(one: Recording) -> None:
-    first, second, third = many(one, 3).drops
-    hum = [Note("hum_removed", value=x, unit="N", others={"frequency": 50.0}) for x in (12, -3.5)]
-    drops = [
-        replace(first, notes=(hum[0], Note("peaks_unknown"))),
-        replace(second, notes=(hum[1], Note("offset_removed", value=4.0, unit="N"))),
-        replace(third, notes=()),
-    ]
-    assert group_notes(drops, "drops", lambda note: not note.is_warning) == [
-        "hum of 50 Hz, amplitude -3.5 to 12 N, was removed (2 of 3 drops)",
-        f"an offset of 4 N was removed ({second.name})",
-    ]
-    assert len(group_notes(drops, "drops", lambda note: note.is_warning)) == 1
-
-
-def test_drops_that_were_left_out_are_listed(one: Recording) -> None:
-    notes = tuple(
-        Note("drop_left_out", value=i, others={"time": i / 2, "reason": "touched"})
-        for i in (2, 5, 6, 7)
-    )
-    origin = replace(one.origins[0], notes=notes)
-    (text,) = group_notes([origin], "files", lambda _: True)
-    assert text == "left out: drop 2, 5 to 7 at 1.00 to 3.50 s, touched"
 
 
 @pytest.mark.parametrize(
