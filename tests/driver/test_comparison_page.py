@@ -31,6 +31,15 @@ def plots(page: str) -> list[dict[str, Any]]:
     return read
 
 
+def test_page_is_complete_in_one_file() -> None:
+    page = COMPARISON.html()
+    assert COMPARISON.files().keys() == {"comparison.svg", "comparison.html"}
+    # Nothing is loaded from anywhere: the plots' own code stands in the page.
+    assert "http" not in re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
+    assert not re.search(r"<(script|link|img)[^>]*\b(src|href)=", page)
+    assert '"thud/plot.js": "data:text/javascript;base64,' in page
+
+
 def test_page_has_the_curves_of_the_picture() -> None:
     figure, page = COMPARISON.plot(), plots(COMPARISON.html())
     assert len(page) == 3
@@ -62,10 +71,14 @@ def test_names_and_cells_are_no_code() -> None:
     assert plots(page)[0]["curves"][0]["name"] == "</script><b>"
 
 
+def long_names(count: int) -> Comparison:
+    names = [f"a_case_with_a_name_that_is_rather_long_{i}" for i in range(count)]
+    return Comparison(dict.fromkeys(names, SHELL), {})
+
+
 @pytest.mark.parametrize("count", [1, 3, 9])
 def test_picture_is_a_column_wide_for_any_number_of_cases(count: int) -> None:
-    names = [f"a_case_with_a_name_that_is_rather_long_{i}" for i in range(count)]
-    figure = Comparison(dict.fromkeys(names, SHELL), {}).plot()
+    figure = long_names(count).plot()
     assert figure.get_figwidth() == pytest.approx(WIDTH)
     assert_clean(figure)
 
@@ -114,8 +127,7 @@ def assert_scrolls_inside(page: Any, table: Any, width: int) -> None:  # noqa: A
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [320, 390, 1000])
 def test_table_scrolls_inside_a_narrow_page(width: int, tmp_path: Path) -> None:
-    names = [f"a_case_with_a_name_that_is_rather_long_{i}" for i in range(9)]
-    html = Comparison(dict.fromkeys(names, SHELL), {}).html()
+    html = long_names(9).html()
     with open_in_browser(tmp_path / "page.html", html) as page:
         assert_scrolls_inside(page, page.locator(".table"), width)
         # At least two columns of numbers are in sight.

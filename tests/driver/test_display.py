@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import inspect
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -27,7 +27,11 @@ MASS = {"mass": {"low": 2.4, "high": 2.6}}
 GRID = {"mass": {**MASS["mass"], "count": 2}, "height": {"values": [0.5, 1.0]}}
 OCTAVES = np.array([63.0, 125.0, 250.0, 500.0])
 FREQUENCY = np.array([20.0, 30.0, 40.0, 50.0])
-FIXED = {"fixed": {"model": "hunt_crossley", "contact_time": 0.02, "restitution": 0.8}}
+LIMITED = {"model": "hunt_crossley", "contact_time": 0.02, "restitution": 0.8}
+
+
+def study(size: int = 4) -> dict[str, Any]:
+    return {"fixed": LIMITED, "parameters": MASS, "design": {"size": size}}
 
 
 @cache
@@ -65,7 +69,7 @@ RESULTS: dict[Callable[[], Displayed], str] = {
     lambda: moved().injected_energy(): ".csv",
     lambda: recorded(impact()): ".csv",
     lambda: impact().assess(): ".csv",
-    lambda: thud.compare({"one": impact(), "two": recorded(impact())}): "",
+    lambda: thud.compare({"<b>&": impact(), "two": recorded(impact())}): "",
     lambda: thud.solve_many({"mass": [2.0, -1.0, 2.5]}): ".csv",
     lambda: thud.free_modes(count=2): ".vtu",
     press: ".csv",
@@ -82,11 +86,11 @@ RESULTS: dict[Callable[[], Displayed], str] = {
     thud.get_bands: ".csv",
     sound: ".wav",
     lambda: sound().sounds[0]: ".csv",
-    lambda: thud.sweep({**FIXED, "parameters": GRID}): ".nc",
-    lambda: thud.design({**FIXED, "parameters": GRID}): ".nc",
-    lambda: thud.uncertainty({**FIXED, "parameters": MASS, "design": {"size": 4}}): ".nc",
-    lambda: thud.sensitivity({**FIXED, "parameters": MASS, "design": {"size": 4}}): ".nc",
-    lambda: thud.surrogate({**FIXED, "parameters": MASS, "design": {"size": 64}}): ".nc",
+    lambda: thud.sweep({"fixed": LIMITED, "parameters": GRID}): ".nc",
+    lambda: thud.design({"fixed": LIMITED, "parameters": GRID}): ".nc",
+    lambda: thud.uncertainty(study()): ".nc",
+    lambda: thud.sensitivity(study()): ".nc",
+    lambda: thud.surrogate(study(64)): ".nc",
     lambda: thud.fit(thud.solve(model=LUMPED), ["mass"], thud.Case(model=LUMPED)): "",
     lambda: thud.fit(
         thud.CompressionTarget(press().deflection, press().force), ["youngs_modulus"]
@@ -178,7 +182,7 @@ def test_results_are_drawn(example: tuple[Displayed, str]) -> None:
 
 def test_texts_name_verdicts_and_numbers(flagship: thud.Impact) -> None:
     """Of a verdict what causes it, of many drops how many conform and failed."""
-    shell = thud.solve(model="hollow_sphere").assess()
+    shell = impact().assess()
     causes = [entry.name for entry in shell.criteria if entry.conforms != "conforms"]
     assert len(causes) == 3
     assert all(name in repr(shell) for name in causes)
@@ -214,12 +218,6 @@ def test_warnings_are_shown() -> None:
     assert [note.message for note in odd.notes] == list(map(str, odd.notes)) != []
 
 
-def test_html_is_escaped(flagship: thud.Impact) -> None:
-    shown = thud.compare({"<script>&": flagship})._repr_html_()
-    assert "<script>" not in shown
-    assert shown.count("&lt;script&gt;&amp;") == 2
-
-
 def test_dataset_of_an_impact_has_units_and_provenance(
     flagship: thud.Impact, tmp_path: Path
 ) -> None:
@@ -249,10 +247,8 @@ def test_dataset_of_an_ensemble_is_that_of_a_study() -> None:
     heights = {"height": [0.5, 1.0, 500.0]}
     many = thud.solve_many(heights, thud.Case(levels=thud.Levels(bands="third")), forces=True)
     found = many.to_xarray()
-    fixed = {"bands": "both"}
-    study = thud.sweep(
-        {"parameters": {"height": {"values": heights["height"]}}, "fixed": fixed}
-    ).dataset
+    varied = {"height": {"values": heights["height"]}}
+    study = thud.sweep({"parameters": varied, "fixed": {"bands": "both"}}).dataset
     names = set(study.data_vars) & set(found.data_vars)
     assert {"floor_octave", "elastic_third", "margin", "reason"} <= names
     for name in names:

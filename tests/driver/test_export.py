@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from conftest import REPOSITORY, codes, names_in
 from recording_files import opened
+from scipy.io import loadmat
 from synthetic import make_recording
 
 import thud
@@ -46,6 +47,8 @@ def half_sine(rate: float, start: float = 0.0) -> BlockedForce:
 def test_files_hold_the_force_to_their_last_digit(kind: str, digits: float, tmp_path: Path) -> None:
     ending, _ = EXPORTS[kind]
     path = tmp_path / f"force{ending}"
+    # A path that its user names is replaced.
+    half_sine(44100.0).save(path)
     FORCE.save(path)
     calibration = 2048.0 if kind == "wav" else None
     (signal,) = opened(path, calibration=calibration)
@@ -62,10 +65,7 @@ def test_files_tell_units_rate_kind_and_checksum(tmp_path: Path) -> None:
         FORCE.save(tmp_path / f"force{ending}")
         text = (tmp_path / f"force{ending}").read_bytes()
         if kind == "mat":
-            from scipy.io import loadmat
-
-            about = loadmat(tmp_path / "force.mat")["about"]
-            text = "\n".join(np.ravel(about)).encode()
+            text = "\n".join(np.ravel(loadmat(tmp_path / "force.mat")["about"])).encode()
         for word in ("force on the floor", "N, positive", "Sample rate: 44100 Hz", checksum):
             assert word.encode() in text, f"{kind}: {word}"
         # The power of two above the peak.

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY, names_in
+from conftest import REPOSITORY, names_in, noted
 
 import thud
 from thud.base.bridge import ask
@@ -23,7 +23,6 @@ from thud.level.rating import class_text
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from conftest import ErrorsOf
 
 # ISO 12354, 220 mm floor of 5 m x 4 m: thirds 50 to 630 Hz.
 PUBLISHED = [57.3, 58.2, 59.2, 60.2, 61.1, 62.1, 62.5, 62.7, 63.0, 63.3, 63.6, 64.0]
@@ -49,11 +48,10 @@ def test_tapping_levels_are_those_of_the_published_example() -> None:
     assert found.level[:12] == pytest.approx(PUBLISHED, abs=0.1)
 
 
-def test_page_tells_where_a_floor_is_not_what_it_claims_to_be() -> None:
+def test_note_names_the_floors_that_are_not_what_they_claim_to_be() -> None:
     room = thud.Room(ceiling_mass=100.0, ceiling_depth=0.5)
     found = thud.predict_level(thud.solve(), thud.Plate(thickness=0.4, screed_thickness=0.08), room)
-    notes = thud.compare_floors({"quiet": found, "again": found}).notes
-    (note,) = [note for note in notes if note.code == "level_below_paths"]
+    note = noted(thud.compare_floors({"quiet": found, "again": found}).notes, "level_below_paths")
     assert (note.subject, note.high) == ("quiet, again", 30.0)
 
 
@@ -102,16 +100,12 @@ def test_tapping_level_is_the_formula_of_iso_12354_2() -> None:
         assert found.level[i] == pytest.approx(expected, abs=1e-9)
     higher = [800, 1000, 1250, 1600, 2000, 2500, 3150]
     assert found.frequency[12:].tolist() == higher
-    assert thud.tapping_level(floor).level.tolist() == (
-        thud.tapping_level(floor, thud.Room()).level.tolist()
-    )
-
-
-@pytest.mark.parametrize("ratio", [1 / 1.25, 1.25])
-def test_tapping_level_is_of_floors_near_concrete(ratio: float) -> None:
-    """The constant of the formula moves by 10 lg of the ratio, 1 dB at 1.26."""
-    floor = thud.Plate(wave_speed=3500.0 * ratio, density=2300.0)
-    assert np.isfinite(thud.tapping_level(floor).level).all()
+    default, stated = (thud.tapping_level(floor, *rooms).level for rooms in ((), (thud.Room(),)))
+    assert np.array_equal(default, stated)
+    # The constant of the formula moves by 10 lg of the ratio, 1 dB at 1.26: near concrete.
+    for ratio in (1 / 1.25, 1.25):
+        near = thud.Plate(wave_speed=3500.0 * ratio, density=2300.0)
+        assert np.isfinite(thud.tapping_level(near).level).all()
 
 
 def test_comparison_has_the_numbers_of_its_predictions(found: thud.FloorComparison) -> None:
@@ -159,11 +153,10 @@ def test_error_of_the_tapping_level_is_no_empty_cell(
     found: thud.FloorComparison, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(*_: object) -> None:
-        message = "&room: sound_speed"
-        raise thud.InputError(message)
+        raise thud.InputError
 
     monkeypatch.setattr("thud.floors.floor_comparison.tapping_level", refuse)
-    with pytest.raises(thud.InputError, match="sound_speed"):
+    with pytest.raises(thud.InputError):
         found.rows()
 
 
@@ -186,27 +179,17 @@ def test_page_draws_chain_and_ratings(found: thud.FloorComparison) -> None:
         [one.rating.level + one.rating.uncertainty for one in predictions],
     ):
         assert any(values == pytest.approx(wanted) for values in drawn)
-    page = found.files()["floors.html"].decode()
-    assert page.count('"curves": ') == 4
-    assert "Comparison of floors" in page
+    assert found.files()["floors.html"].count(b'"curves": ') == 4
 
 
-def test_command_compares_cases(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], errors_of: ErrorsOf
-) -> None:
-    paths = [tmp_path / f"{name}.nml" for name in CASES]
+def test_command_compares_cases(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    paths = [str(tmp_path / f"{name}.nml") for name in CASES]
     for path, case in zip(paths, CASES.values(), strict=True):
         thud.write_case(case, path)
     output = tmp_path / "page"
-    assert main(["floor", *map(str, paths), "--output", str(output)]) == 0
-    names = {"thud.txt", "floors.svg", "floors.html"}
-    assert set(names_in(output)) == names
+    assert main(["floor", *paths, "--output", str(output)]) == 0
+    assert set(names_in(output)) == {"thud.txt", "floors.svg", "floors.html"}
     assert "thick" in capsys.readouterr().out
-    assert str(paths[0]) in errors_of("floor", paths[0], paths[0], "-o", output)
-    bare = tmp_path / "bare.nml"
-    bare.write_text("&ball /\n&drop /\n&model /\n", encoding="utf-8")
-    assert "bare: &floor" in errors_of("floor", bare, "-o", tmp_path / "none")
-    assert not (tmp_path / "none").exists()
 
 
 def test_synthetic_survey_gives_back_what_was_put_into_it(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY, names_in, naming
+from conftest import REPOSITORY, names_in
 from PIL import Image
 
 import thud
@@ -66,8 +66,6 @@ def test_figures_are_a_column_wide_and_whole(tmp_path: Path) -> None:
     for ending in ("png", "svg", "pdf"):
         thud.plot.save(figure, tmp_path / f"levels.{ending}")
     assert names_in(tmp_path) == ["levels.pdf", "levels.png", "levels.svg"]
-    with pytest.raises(thud.InputError, match=naming("levels.xyz", "png")):
-        thud.plot.save(figure, tmp_path / "levels.xyz")
 
 
 def test_motion_shows_instants_from_first_touch_to_release(deformed: thud.Impact) -> None:
@@ -79,12 +77,8 @@ def test_motion_shows_instants_from_first_touch_to_release(deformed: thud.Impact
     assert times[0] == pytest.approx(0, abs=0.6)
     assert times[-1] == pytest.approx(1e3 * deformed.contact_time, abs=0.6)
     assert figure.get_figwidth() == pytest.approx(WIDTH)
-
-
-def test_time_of_an_instant_is_nearer_to_its_ball_than_to_others(deformed: thud.Impact) -> None:
-    figure = thud.plot.motion(deformed)
+    # Each time is nearer to its ball than to the one below.
     figure.draw_without_rendering()
-    panels = [axes for axes in figure.axes if axes.get_title()]
     for panel, below in zip(panels, panels[3:], strict=False):
         label = panel.title.get_window_extent()
         own = panel.get_window_extent().y0 - label.y1
@@ -130,9 +124,8 @@ def test_floor_is_drawn_where_it_moves() -> None:
 def test_mode_shapes_are_named() -> None:
     modes = thud.free_modes(count=4)
     figure = thud.plot.mode_shapes(modes)
-    assert [axes.get_title() for axes in figure.axes][:4] == [
-        f"{f:.1f} Hz, n = {n}" for f, n in zip(modes.frequency, modes.harmonic, strict=True)
-    ]
+    titles = [f"{f:.1f} Hz, n = {n}" for f, n in zip(modes.frequency, modes.harmonic, strict=True)]
+    assert [axes.get_title() for axes in figure.axes][:4] == titles
     assert figure.get_figwidth() == pytest.approx(WIDTH)
 
 
@@ -153,9 +146,7 @@ def test_loss_factors_follow_their_laws() -> None:
 
 def test_case_has_the_figures_of_its_results(deformed: thud.Impact) -> None:
     modes = thud.free_modes(count=2)
-    assert set(thud.plot.case_figures(thud.solve())) == {"force", "levels"}
-    figures = thud.plot.case_figures(deformed)
-    assert set(figures) == {"force", "levels", "motion"}
+    assert set(thud.plot.case_figures(deformed)) == {"force", "levels", "motion"}
     assert set(thud.plot.case_figures(modes=modes)) == {"modes"}
     assert set(thud.plot.case_figures(thud.solve(), modes)) == {"force", "levels", "modes"}
     assert list(thud.plot.case_figures(deformed, modes, count=3)) == ["force", "levels", "modes"]

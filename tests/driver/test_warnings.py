@@ -19,14 +19,8 @@ if TYPE_CHECKING:
 
     from thud.base.note import Note
 
-# Subject and value of a warning, and the limit that it exceeds, and input that earns it.
-DOUBTFUL = {
-    ("ball", 11482.0, 2200.0): "&ball mass = 25 / &sampling duration = 0.2 /",
-    ("ball.youngs_modulus", 1.6, 1e4): "&ball youngs_modulus = 1.6 / &drop height = 1e-6 /"
-    " &sampling duration = 10, sample_rate = 2000 / &model name = 'hollow_sphere' /",
-    ("drop", -24.67, 4.0): "&drop height = 1e-7 /"
-    " &model name = 'hunt_crossley' / &hunt_crossley contact_time = 0.02 /",
-}  # fmt: skip
+# A case that is possible and not plausible.
+DOUBTFUL = "&ball mass = 25 / &sampling duration = 0.2 /"
 
 
 def limits_of(notes: Iterable[Note]) -> list[tuple[str, float, float]]:
@@ -38,21 +32,14 @@ def limits_of(notes: Iterable[Note]) -> list[tuple[str, float, float]]:
     ]
 
 
-@pytest.mark.parametrize("limit", DOUBTFUL)
-@pytest.mark.slow
 @pytest.mark.usefixtures("working_directory")
 def test_doubtful_input_raises_a_warning_by_every_command(
-    limit: tuple[str, float, float],
-    case_file: CaseFile,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    case_file: CaseFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = case_file(DOUBTFUL[limit])
+    path = case_file(DOUBTFUL)
     with pytest.warns(thud.PlausibilityWarning) as caught:
         impact = thud.solve(thud.read_case(path))
-    subject, value, end = limit
-    expected = (subject, pytest.approx(value, rel=0.01), end)
-    assert limits_of(impact.notes).count(expected) == 1
+    assert impact.notes
     assert [warning.message.args for warning in caught] == [(note,) for note in impact.notes]  # type: ignore[union-attr]
     assert {warning.filename for warning in caught} == {__file__}
     assert cli.main(["run", "--no-figures", "-q", str(path)]) == 0
@@ -82,7 +69,13 @@ def test_plausible_input_raises_no_warning(text: str, case_file: CaseFile) -> No
         assert thud.solve(thud.read_case(case_file(text))).notes == ()
 
 
+# Subject and value of a warning, and the limit that it exceeds, and input that earns it.
 OUTSIDE = {
+    ("ball", 11482.0, 2200.0): DOUBTFUL,
+    ("ball.youngs_modulus", 1.6, 1e4): "&ball youngs_modulus = 1.6 / &drop height = 1e-6 /"
+    " &sampling duration = 10, sample_rate = 2000 / &model name = 'hollow_sphere' /",
+    ("drop", -24.67, 4.0): "&drop height = 1e-7 /"
+    " &model name = 'hunt_crossley' / &hunt_crossley contact_time = 0.02 /",
     ("ball", 0.5, 0.4): "&ball wall_thickness = 0.0445 / &model name = 'hollow_sphere' /",
     ("ball.poisson_ratio", 0.3, 0.45): "&ball poisson_ratio = 0.3 /",
     ("drop", 0.523, 0.5): "&drop height = 3 / &model name = 'hollow_sphere' /",
