@@ -111,22 +111,22 @@ def _find_hidden(figure: Figure, complete: Picture) -> list[str]:
     artists: dict[str, list[Any]] = defaultdict(list)
     for axes in figure.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            artists["".join(label.split())].append(handle)
+            parts = handle.get_children() if isinstance(handle, Container) else [handle]
+            artists["".join(label.split())].append([part for part in parts if part is not None])
     legends = [*figure.legends, *filter(None, (axes.get_legend() for axes in figure.axes))]
+    names = [text.get_text() for legend in legends for text in legend.get_texts()]
     return [
-        text.get_text()
-        for legend in legends
-        for text in legend.get_texts()
-        if not any(_is_seen(figure, a, complete) for a in artists["".join(text.get_text().split())])
+        name
+        for name in names
+        if not any(_is_seen(figure, parts, complete) for parts in artists["".join(name.split())])
     ]
 
 
-def _is_seen(figure: Figure, artist: Any, complete: Picture) -> bool:  # noqa: ANN401 - of matplotlib
-    """Return whether a picture without an artist differs.
+def _is_seen(figure: Figure, parts: list[Any], complete: Picture) -> bool:
+    """Return whether a picture without the parts of an artist differs.
 
     Of an artist without data, which stands for others in a legend, the color must be in the axes.
     """
-    parts = [*_parts(artist)]
     if all(map(_is_empty, parts)):
         return any(_has_color(figure, part, complete) for part in parts)
     for part in parts:
@@ -137,28 +137,16 @@ def _is_seen(figure: Figure, artist: Any, complete: Picture) -> bool:  # noqa: A
     return int((change > CONTRAST / 2).sum()) >= SEEN
 
 
-def _parts(artist: Any) -> list[Artist]:  # noqa: ANN401 - of matplotlib
-    if isinstance(artist, Container):
-        return [child for child in artist.get_children() if child is not None]
-    return [artist]
-
-
 def _is_empty(artist: Artist) -> bool:
     if isinstance(artist, Line2D):
         return len(artist.get_xdata()) == 0  # type: ignore[arg-type]
-    if isinstance(artist, Collection):
-        return not any(len(path.vertices) for path in artist.get_paths())
-    return False
+    paths = artist.get_paths() if isinstance(artist, Collection) else None
+    return paths is not None and not any(len(path.vertices) for path in paths)
 
 
 def _has_color(figure: Figure, artist: Any, complete: Picture) -> bool:  # noqa: ANN401 - of matplotlib
     """Return whether the color of an artist is found in axes."""
     color = artist.get_color() if isinstance(artist, Line2D) else artist.get_facecolor()[0]
-    near = abs(complete - 255 * np.array(to_rgb(color))).max(axis=-1) < CONTRAST / 4
-    height = len(complete)
-    for axes in figure.axes:
-        box = axes.get_window_extent()
-        rows = slice(max(0, int(height - box.y1)), int(height - box.y0))
-        if near[rows, max(0, int(box.x0)) : int(box.x1)].sum() >= SEEN:
-            return True
-    return False
+    near = abs(complete - 255 * np.array(to_rgb(color))).max(axis=-1)[::-1] < CONTRAST / 4
+    boxes = (axes.get_window_extent().extents.astype(int).clip(0) for axes in figure.axes)
+    return any(near[bottom:top, left:right].sum() >= SEEN for left, bottom, right, top in boxes)

@@ -161,16 +161,30 @@ def sixty_drops(one: Recording) -> Recording:
     return replace(base, drops=drops, origins=noted(base.origins, (*left_out, overdue)))
 
 
-def hostile(one: Recording) -> Recording:
-    """Return a recording whose texts are code."""
+# Keys that are dates, or a file.
+NO_TEXTS = {"date", "received", "issued", "calibrated", "due", "accreditation_mark"}
+MARKUP = ["</", "<", ">", '"', "'", "&lt;", "script", "style", "{{", "}}", "{%", "-->", "\\"]
+
+
+def filled(kind: type, text: str) -> Any:  # noqa: ANN401 - of the kind
+    """Return what a laboratory states, with a text in every key that takes one."""
+    kinds = {"str": text, "tuple[str, ...]": (text, text)}
+    texts = [f for f in fields(kind) if f.type in kinds and f.name not in NO_TEXTS]
+    keys = {f.name: kinds[f.type] for f in texts}
+    return kind(**keys)
+
+
+def hostile(one: Recording, text: str = HOSTILE) -> Recording:
+    """Return a recording with a text wherever a user can state one."""
     # A configuration refuses characters that no page shows; files may hold them.
-    line = "".join(filter(str.isprintable, HOSTILE))
-    texts = dict.fromkeys(("laboratory", "ball", "serial"), line)
-    base = many(one, 2, **texts, instruments=(line, line))
-    notes = (Note("plate_unknown", others={"what": HOSTILE, "keys": ""}),)
-    drops = tuple(replace(d, name=HOSTILE + d.name, notes=notes) for d in base.drops)
-    origins = tuple(replace(o, name=HOSTILE, calibration=HOSTILE) for o in base.origins)
-    return replace(base, drops=drops, origins=origins)
+    line = "".join(filter(str.isprintable, text)).strip() or "x"
+    parts = {"report": filled(ReportConfig, line), "properties": filled(Properties, line)}
+    config = replace(filled(Config, line), instruments=(filled(Instrument, line),) * 2, **parts)
+    notes = (Note("plate_unknown", text, others={"what": text, "keys": text}),)
+    (drop,), (origin,) = one.drops, one.origins
+    drops = (replace(drop, name=text, notes=notes, restitutions={text: drop.restitution}),)
+    origins = (replace(origin, name=text, calibration=text, date=text, notes=notes),)
+    return Recording(text, drops, origins, config)
 
 
 def crowded(one: Recording) -> Recording:
@@ -253,38 +267,19 @@ class Skeleton(HTMLParser):
         self.tags += [(f"/{tag}",)]
 
 
-DATES = {"date", "received", "issued", "calibrated", "due"}
-MARKUP = ["</", "<", ">", '"', "'", "&lt;", "script", "style", "{{", "}}", "{%", "-->", "\\"]
+@pytest.fixture(scope="module")
+def harmless(one: Recording) -> Skeleton:
+    """Return the tags of a page whose texts are a letter."""
+    return Skeleton(report_page(report_data(hostile(one, "x"))))
 
 
-def filled(kind: type, text: str) -> Any:  # noqa: ANN401 - of the kind
-    """Return what a laboratory states, with a text in every key that takes one."""
-    kinds = {"str": text, "tuple[str, ...]": (text, text)}
-    keys = {f.name: kinds[f.type] for f in fields(kind) if f.type in kinds and f.name not in DATES}
-    return kind(**keys)
-
-
-def page_of(one: Recording, text: str) -> tuple[str, dict[str, Any]]:
-    """Return page and data of a report with a text wherever a user can state one."""
-    line = "".join(filter(str.isprintable, text)).strip() or "x"
-    parts = {"report": filled(ReportConfig, line), "properties": filled(Properties, line)}
-    config = replace(filled(Config, line), instruments=(filled(Instrument, line),) * 2, **parts)
-    notes = (Note("plate_unknown", text, others={"what": text, "keys": text}),)
-    (drop,), (origin,) = one.drops, one.origins
-    drops = (replace(drop, name=text, notes=notes, restitutions={text: drop.restitution}),)
-    origins = (replace(origin, name=text, calibration=text, date=text, notes=notes),)
-    recording = Recording(text, drops, origins, config)
-    data = data_of(recording)
-    assert data["laboratory"] == line
-    return report_page(report_data(recording)), data
-
-
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(text=st.lists(st.sampled_from(MARKUP) | st.characters(), max_size=12).map("".join))
-def test_no_text_is_markup(one: Recording, text: str) -> None:
-    page, expected = (Skeleton(page_of(one, entry)[0]) for entry in (text, "x"))
-    assert page.tags == expected.tags
-    assert page.style == expected.style
+def test_no_text_is_markup(one: Recording, harmless: Skeleton, text: str) -> None:
+    data = report_data(hostile(one, text))
+    page = Skeleton(report_page(data))
+    assert (page.tags, page.style) == (harmless.tags, harmless.style)
+    assert json.loads(json_bytes(data))["name"] == text
 
 
 @pytest.fixture(scope="module")
@@ -356,11 +351,8 @@ def test_page_holds_the_rows_of_the_table(written: tuple[Recording, Path]) -> No
         expected = [*criterion_row(entry)]
         assert [cell for cell in map(str.strip, cells) if cell] == expected
         assert " ".join(expected) in printed
-    for words in (
-        recording.assess().conforms, recording.origins[0].checksum, thud.__version__, "signature",
-        "place and date", "report.json", "force on the floor", "single drops",
-    ):  # fmt: skip
-        assert words in printed.lower()
+    for text in (recording.origins[0].checksum, thud.__version__, "Force on the floor"):
+        assert text in printed
 
 
 def test_each_page_has_its_number_and_that_of_the_report(written: tuple[Recording, Path]) -> None:
