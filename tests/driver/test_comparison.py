@@ -25,14 +25,6 @@ if TYPE_CHECKING:
 STEPS = sorted((REPOSITORY / "inputs/comparison").glob("*.nml"))
 
 
-def write_recording(path: Path, impact: thud.Impact) -> None:
-    # A quarter of a second of noise before and after the impact, as a force plate has it.
-    noise = np.random.default_rng(1).normal(scale=0.5, size=22050)
-    noise[11025 : 11025 + len(impact.time)] += impact.floor_force
-    table = np.column_stack([np.arange(len(noise)) / impact.sample_rate, noise])
-    np.savetxt(path, table, "%.12g", ",", header="time_s,force_N", comments="")
-
-
 def test_paper_s_argument_from_end_to_end() -> None:
     comparison = thud.compare(read_all(STEPS))
     levels = {name: impact.levels(force="floor") for name, impact in comparison.impacts.items()}
@@ -100,11 +92,8 @@ def test_recordings_say_what_is_doubtful_and_have_their_names(shell: thud.Impact
         assert all(note.subject in own.subject for note, own in zip(expected, found, strict=True))
 
 
-def test_recording_stands_beside_its_model(shell: thud.Impact, tmp_path: Path) -> None:
-    write_recording(tmp_path / "plate.csv", shell)
-    recording = thud.read_recording(
-        tmp_path / "plate.csv", config=Config(calibration_uncertainty=0.001)
-    )
+def test_recording_stands_beside_its_model(shell: thud.Impact) -> None:
+    recording = recorded(shell, calibration_uncertainty=0.001)
     assert recording.sample_rate == pytest.approx(44100)
     assert recording.contact_time == pytest.approx(shell.contact_time, abs=0.3e-3)
     assert recording.peak_force == pytest.approx(shell.peak_force, abs=3)
@@ -117,11 +106,9 @@ def test_recording_stands_beside_its_model(shell: thud.Impact, tmp_path: Path) -
 
 
 @pytest.mark.usefixtures("working_directory")
-def test_command_writes_the_page(
-    shell: thud.Impact, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    write_recording(tmp_path / "plate.csv", shell)
-    assert cli.main(["compare", str(STEPS[0]), "plate.csv"]) == 0
+def test_command_writes_the_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    record = REPOSITORY / "inputs/recordings/drop_1.csv"
+    assert cli.main(["compare", str(STEPS[0]), str(record)]) == 0
     assert "Results: outputs/comparison" in capsys.readouterr().out
     assert (tmp_path / "outputs/comparison/comparison.html").stat().st_size < 1e6
 

@@ -25,7 +25,7 @@ from PIL import Image
 
 import thud
 from thud import cli, plot, report
-from thud.plot.style import COLORS, curve_style
+from thud.plot.style import COLORS, WIDTH, curve_style
 from thud.recordings.signal import Signal
 
 LONG = "rubber_ball_with_a_name_that_is_much_longer_than_the_column_of_a_page_is_wide"
@@ -70,6 +70,7 @@ def test_long_names_of_many_cases_stay_outside_of_the_axes(shell: thud.Impact, c
     for draw in (plot.force_history, plot.levels):
         figure = draw(impacts)
         assert_clean(figure)
+        assert figure.get_figwidth() == pytest.approx(WIDTH)
         axes = figure.axes[0].get_window_extent()
         heights.append(axes.height / figure.dpi)
     # The legend does not squeeze the axes.

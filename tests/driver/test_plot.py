@@ -60,14 +60,6 @@ def test_levels_show_the_tolerance_band(shell: thud.Impact, source: str) -> None
     np.testing.assert_array_equal(curves["ball"], shell.levels(force="floor"))
 
 
-def test_figures_are_a_column_wide_and_whole(tmp_path: Path) -> None:
-    figure = thud.plot.levels({"a": thud.solve(), "b": thud.solve(drop=thud.Drop(0.1))}, "floor")
-    assert figure.get_figwidth() == pytest.approx(WIDTH)
-    for ending in ("png", "svg", "pdf"):
-        thud.plot.save(figure, tmp_path / f"levels.{ending}")
-    assert names_in(tmp_path) == ["levels.pdf", "levels.png", "levels.svg"]
-
-
 def test_motion_shows_instants_from_first_touch_to_release(deformed: thud.Impact) -> None:
     figure = thud.plot.motion(deformed)
     panels = [axes for axes in figure.axes if axes.get_title()]
