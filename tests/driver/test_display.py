@@ -193,13 +193,10 @@ def test_texts_name_verdicts_and_numbers(flagship: thud.Impact) -> None:
     assert all(name in repr(shell) for name in causes)
     assert "octave" not in repr(flagship.assess())
     assert shell.rows()[-1][-1] == "does not conform"
-    for masses, levels, words in (
-        ([2.0, -1.0], True, ("2 drops", "0 conform", "1 failed")),
-        ([-1.0, -2.0], True, ("0 conform", "2 failed")),
-        ([2.4, 2.5], False, ("2 drops", "not assessed")),
-    ):
-        text = repr(thud.solve_many({"mass": masses}, levels=levels))
-        assert all(word in text for word in words)
+    many = thud.solve_many({"mass": [2.0, -1.0, -2.0]})
+    numbers = {"0 conform": True, "2 failed": True, "not assessed": False}
+    assert {text: text in repr(many) for text in numbers} == numbers
+    assert "not assessed" in repr(thud.solve_many({"mass": [2.4]}, levels=False))
 
 
 def test_criteria_are_drawn_as_fractions_of_their_ranges(flagship: thud.Impact) -> None:

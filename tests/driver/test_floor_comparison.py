@@ -171,6 +171,7 @@ def test_page_draws_chain_and_ratings(found: thud.FloorComparison) -> None:
         (level, thin.level),
     ):
         assert axes.lines[0].get_ydata() == pytest.approx(values)
+    assert ratings.get_xlabel().endswith(", dB")
     predictions = found.predictions.values()
     drawn = [np.asarray(line.get_xdata()) for line in ratings.lines]
     for wanted in (
