@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from conftest import REPOSITORY, names_in, noted
+from test_figure_look import assert_clean
 
 import thud
 from thud.base.bridge import ask
@@ -172,6 +173,7 @@ def test_page_draws_chain_and_ratings(found: thud.FloorComparison) -> None:
     ):
         assert axes.lines[0].get_ydata() == pytest.approx(values)
     assert ratings.get_xlabel().endswith(", dB")
+    assert_clean(figure)
     predictions = found.predictions.values()
     drawn = [np.asarray(line.get_xdata()) for line in ratings.lines]
     for wanted in (
