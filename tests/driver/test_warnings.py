@@ -3,33 +3,24 @@
 from __future__ import annotations
 
 import re
+import tomllib
 import warnings
 from typing import TYPE_CHECKING
 
 import pytest
+from conftest import REPOSITORY
 
 import thud
 from thud import cli
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
     from pathlib import Path
 
     from conftest import CaseFile
 
-    from thud.base.note import Note
 
 # A case that is possible and not plausible.
 DOUBTFUL = "&ball mass = 25 / &sampling duration = 0.2 /"
-
-
-def limits_of(notes: Iterable[Note]) -> list[tuple[str, float, float]]:
-    """Return subject, value and exceeded limit of each note on a limit."""
-    return [
-        (note.subject, note.value, note.low if note.value < note.low else note.high)
-        for note in notes
-        if note.code == "outside_limits"
-    ]
 
 
 @pytest.mark.usefixtures("working_directory")
@@ -69,42 +60,6 @@ def test_plausible_input_raises_no_warning(text: str, case_file: CaseFile) -> No
         assert thud.solve(thud.read_case(case_file(text))).notes == ()
 
 
-# Subject and value of a warning, and the limit that it exceeds, and input that earns it.
-OUTSIDE = {
-    ("ball", 11482.0, 2200.0): DOUBTFUL,
-    ("ball.youngs_modulus", 1.6, 1e4): "&ball youngs_modulus = 1.6 / &drop height = 1e-6 /"
-    " &sampling duration = 10, sample_rate = 2000 / &model name = 'hollow_sphere' /",
-    ("drop", -24.67, 4.0): "&drop height = 1e-7 /"
-    " &model name = 'hunt_crossley' / &hunt_crossley contact_time = 0.02 /",
-    ("ball", 0.5, 0.4): "&ball wall_thickness = 0.0445 / &model name = 'hollow_sphere' /",
-    ("ball.poisson_ratio", 0.3, 0.45): "&ball poisson_ratio = 0.3 /",
-    ("drop", 0.523, 0.5): "&drop height = 3 / &model name = 'hollow_sphere' /",
-    ("drop", 0.986, 0.5): "&ball wall_thickness = 0.016, mass = 1, youngs_modulus = 5e6,"
-    " poisson_ratio = 0.49 / &model name = 'modal_ball' /",
-    ("drop", 2.1, 2.0): "&ball wall_thickness = 0.0272, youngs_modulus = 4e5 /"
-    " &drop height = 1.6 / &sampling duration = 0.1 / &model name = 'hollow_sphere' /",
-    ("drop", 2.8, 1.0): "&drop height = 50 / &sampling duration = 0.1 /"
-    " &model name = 'measured_modes' / &measured_modes frequency = 10,"
-    " damping_ratio = 0, effective_mass = 2.5 /",
-    ("drop", 0.318, 0.25): "&drop height = 7 /",
-    ("ball", 0.171, 0.1): "&ball gauge_pressure = 3e5 /",
-    ("drop", 0.616, 0.2): "&drop height = 0.01 /",
-    ("sampling.sample_rate", 4000.0, 8000.0): "&sampling sample_rate = 4000 /",
-    ("levels", 2.2e-16, 1e-12): "&drop height = 10 / &sampling duration = 2 /"
-    " &model name = 'hunt_crossley' / &hunt_crossley contact_time = 1, exponent = 3 /",
-    ("sampling", 3.75, 0.2): "&drop height = 0.01 / &ball youngs_modulus = 2.08e6 /"
-    " &model name = 'finite_element' / &mesh polar_elements = 32 /",
-    ("sampling", 3.07, 0.2): "&model name = 'modal_ball' /"
-    " &modal_ball rings = 10, highest_frequency = 300 /",
-    ("floor", -0.667, -1e-6): "&model name = 'hunt_crossley' /"
-    " &hunt_crossley contact_time = 0.02 / &floor name = 'oscillator' /"
-    " &oscillator mass = 0.5, stiffness = 0, damping = 0 / &sampling duration = 0.2 /",
-    ("model", 4.4e-5, 1e-6): "&model name = 'hollow_sphere' /"
-    " &hollow_sphere momentum_flux = 'none' / &floor name = 'oscillator' /"
-    " &oscillator mass = 30, stiffness = 1.70549e7, damping = 0 / &sampling duration = 0.2 /",
-}
-
-
 def test_drop_without_a_finer_one_is_not_verified(case_file: CaseFile) -> None:
     # At 1.4 times the frequency there are too many modes.
     text = "&ball wall_thickness = 0.01, mass = 0.8, youngs_modulus = 4e5 / &drop height = 0.003 /"
@@ -125,16 +80,23 @@ def test_values_at_the_limits_of_rubbers_raise_no_warning(case_file: CaseFile) -
         assert sum(note.subject.startswith("ball") for note in impact.notes) == number
 
 
-@pytest.mark.parametrize("limit", OUTSIDE)
+@pytest.mark.parametrize(
+    ("text", "subject", "value", "limit"),
+    tomllib.loads((REPOSITORY / "tests/driver/implausible.toml").read_text("utf-8"))["rows"],
+)
 @pytest.mark.slow
 def test_answer_outside_the_theory_raises_a_warning(
-    limit: tuple[str, float, float], case_file: CaseFile
+    text: str, subject: str, value: float, limit: float, case_file: CaseFile
 ) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        found = limits_of(thud.solve(thud.read_case(case_file(OUTSIDE[limit]))).notes)
-    subject, value, end = limit
-    assert found.count((subject, pytest.approx(value, rel=0.01), end)) == 1, found
+        notes = thud.solve(thud.read_case(case_file(text))).notes
+    found = [
+        (note.subject, note.value, note.low if note.value < note.low else note.high)
+        for note in notes
+        if note.code == "outside_limits"
+    ]
+    assert found.count((subject, pytest.approx(value, rel=0.01), limit)) == 1, found
 
 
 @pytest.mark.usefixtures("working_directory")
