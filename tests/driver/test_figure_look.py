@@ -18,7 +18,6 @@ import numpy as np
 import pytest
 from conftest import MINIMAL, REPOSITORY, names_in, python
 from matplotlib.figure import Figure
-from matplotlib.quiver import Quiver, QuiverKey
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 from PIL import Image
@@ -158,21 +157,6 @@ def test_recording_is_drawn_from_first_touch_to_last_release(shell: thud.Impact)
         low, high = limits(thud.read_recording(Signal.from_array(force, 44100)))
         assert -1.5 < low < 0
         assert 20 < high < 22
-
-
-@pytest.mark.slow
-def test_arrows_have_a_key_and_end_above_the_floor() -> None:
-    impact = thud.solve(model="finite_element", flight_before=2e-3, snapshot_interval=1e-3)
-    figure = plot.motion(impact)
-    arrows = [a for axes in figure.axes for a in axes.collections if isinstance(a, Quiver)]
-    assert len(arrows) == 9
-    for quiver in arrows:
-        start = np.asarray(quiver.get_offsets())
-        end = start[:, 1] + quiver.V / quiver.scale  # type: ignore[attr-defined]
-        assert (end >= 0).all()
-    assert len(arrows[0].get_offsets()) > 0
-    (key,) = (artist for artist in figure.findobj(QuiverKey) if isinstance(artist, QuiverKey))
-    assert key.text.get_text() == "4 m/s"
 
 
 def test_files_have_a_title_and_text_of_vector_graphics_is_text(

@@ -163,7 +163,9 @@ def test_error_of_the_tapping_level_is_no_empty_cell(
 
 def test_page_draws_chain_and_ratings(found: thud.FloorComparison) -> None:
     figure = found.plot()
-    ratings, level, radiated, energy, force = figure.axes
+    ratings, level = figure.axes
+    steps = thud.plot.floor_steps(found)
+    force, energy, radiated = steps.axes
     thin = found.predictions["thin"]
     for axes, values in (
         (force, 10 * np.log10(thin.energy / thin.conductance)),
@@ -174,6 +176,7 @@ def test_page_draws_chain_and_ratings(found: thud.FloorComparison) -> None:
         assert axes.lines[0].get_ydata() == pytest.approx(values)
     assert ratings.get_xlabel().endswith(", dB")
     assert_clean(figure)
+    assert_clean(steps)
     predictions = found.predictions.values()
     drawn = [np.asarray(line.get_xdata()) for line in ratings.lines]
     for wanted in (
