@@ -30,6 +30,7 @@ STATE = (
     "src/**/*.c",
     "driver/**/*.py",
     "tests/fortran/*.pf",
+    "tests/fortran/*.f90",
     "tests/driver/*.py",
     "tests/validation/*.py",
 )
