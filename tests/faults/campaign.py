@@ -1,33 +1,46 @@
-"""Parts of the campaign of faults, and the count of what they find."""
+"""The campaign of faults: whatever is given, a right result or one sentence; nothing is left.
+
+    python tests/faults/campaign.py [--part NAME] [--tries N] [--seed N]
+
+Attempts are made in processes of their own, which may crash, hang, grow or leave something behind.
+What is found has a seed; `--part NAME --tries 1 --seed N` makes it again. Exit code 1 where a fault
+was found.
+"""
 
 from __future__ import annotations
 
+import argparse
+import faulthandler
 import json
+import os
 import random
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
 import time
+import traceback
+import warnings
 from collections import Counter
+from contextlib import suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-    from pathlib import Path
+    from collections.abc import Callable, Iterable, Iterator
 
-    Tries = list[tuple[int, random.Random]]
-    Check = Callable[[Tries, Path], Iterable["Finding"]]
+    Finding = tuple[int, str, str]
 
-# What must never happen; every other finding is fine.
-FAULTS = ("crashed", "hung", "NaN", "lost", "mixed", "raw", "grown", "left behind", "wrong")
-# Seeds of the tries of a campaign follow each other; those of the next campaign begin here.
-SPAN = 10**9
-# Seconds between two writings of the counts.
-INTERVAL = 10.0
-
-
-class Finding(NamedTuple):
-    """What became of one try: a word such as "refused" or one of `FAULTS`, and how to see it."""
-
-    word: str
-    detail: str = ""
+# What must never happen; every other word is fine.
+FAULTS = ("crashed", "NaN", "mixed", "raw", "grown", "left", "wrong")
+# Seconds for imports, and for the end of an attempt that was interrupted.
+PATIENCE = 60
+# Address space, bytes, and bytes by which memory may grow: what a header claims must not be taken.
+SPACE, GROWTH = 4 * 2**30, 400 * 2**20
+SANITIZED = "libasan" in os.environ.get("LD_PRELOAD", "")
 
 
 class Part(NamedTuple):
@@ -35,109 +48,160 @@ class Part(NamedTuple):
 
     Attributes
     ----------
-    tries : int or callable
-        Tries of the whole campaign, or what counts them.
-    small : int
-        Tries of the small one.
-    check : callable
-        Makes some tries in a directory: from number and random source of each.
-    share : int
-        Tries that `check` makes at a time.
+    attempt : callable
+        Makes an attempt in the current directory; returns a word, such as "refused" or one of
+        `FAULTS`, and how to see it.
+    tries, small : int
+        Attempts of the campaign, and of the slow tests.
     limit : int
-        Seconds after which a try is interrupted.
+        Seconds that an attempt may take.
     may_stop : bool
-        Interrupted tries are fine: they compute what takes long.
+        Whether an attempt that takes longer is interrupted, since it computes what takes long.
     """
 
-    tries: int | Callable[[], int]
+    attempt: Callable[[random.Random], tuple[str, str]]
+    tries: int
     small: int
-    check: Check
-    share: int = 1
-    limit: int = 300
+    limit: int = 60
     may_stop: bool = False
 
-    def count(self) -> int:
-        """Return the tries of the whole campaign."""
-        return self.tries if isinstance(self.tries, int) else self.tries()
+
+def parts() -> dict[str, Part]:
+    """Return the parts of the campaign by name."""
+    import edges
+    import namelists
+    import readers
+    import servers
+
+    return {
+        "namelists": Part(namelists.attempt, 1500, 300, 10, may_stop=True),
+        "recordings": Part(readers.read_recordings, 4000, 500),
+        "tables": Part(readers.read_tables, 800, 60, 20, may_stop=True),
+        "studies": Part(readers.read_studies, 300, 60, 20, may_stop=True),
+        "lumped": Part(edges.attempt_lumped, 1500, 60),
+        "modal": Part(edges.attempt_modal, 100, 8, 20, may_stop=True),
+        "elements": Part(edges.attempt_elements, 40, 4, 15, may_stop=True),
+        "explorer": Part(servers.attempt, 60, 8),
+    }
 
 
-def draw(name: str, seed: int) -> tuple[int, random.Random]:
-    """Return number and random source of the try of a part with a seed."""
-    return seed % SPAN, random.Random(f"{name}/{seed}")  # noqa: S311
+def find(name: str, seeds: Iterable[int], script: str = __file__) -> Iterator[Finding]:
+    """Yield seed, word and detail of attempts; a process that ends is replaced."""
+    left = list(seeds)
+    while left:
+        with (
+            tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder,
+            tempfile.TemporaryFile() as said,
+            subprocess.Popen(
+                [sys.executable, script, "--part", name, "--work", json.dumps(left)],
+                cwd=folder, stdout=subprocess.PIPE, stderr=said, text=True, start_new_session=True,
+            ) as worker,
+        ):  # fmt: skip
+            assert worker.stdout
+            try:
+                for line in worker.stdout:
+                    yield (left.pop(0), *json.loads(line))
+                code = worker.wait(PATIENCE)
+            finally:
+                # What an attempt has started must not stay.
+                with suppress(ProcessLookupError):
+                    os.killpg(worker.pid, signal.SIGKILL)
+            if left:
+                said.seek(0)
+                last = said.read()[-2000:].decode(errors="replace")
+                yield left.pop(0), "crashed", f"exit code {code}: {last}"
 
 
-def each(attempt: Callable[[random.Random], tuple[str, str]]) -> Check:
-    """Return the check that makes one attempt after the other."""
-    return lambda tries, _: (Finding(*attempt(chance)) for _, chance in tries)
+def work(name: str, part: Part, seeds: list[int]) -> None:
+    """Make attempts in this process; print word and detail of each."""
+    answers = os.fdopen(os.dup(1), "w")
+    # Whatever else is printed goes to the same file as errors, which must not grow.
+    os.dup2(2, 1)
+    warnings.simplefilter("ignore")
+    if not SANITIZED:
+        resource.setrlimit(resource.RLIMIT_AS, (SPACE, SPACE))
+    for folder in ("here", "temporary"):
+        Path(folder).mkdir()
+    temporary = Path("temporary").absolute()
+    tempfile.tempdir = os.environ["TMPDIR"] = str(temporary)
+    os.chdir("here")
+    handles, usual, printed = None, None, 0
+    for seed in seeds:
+        word, detail = attempt(part, random.Random(f"{name}/{seed}"))  # noqa: S311
+        open_now, memory, length = _handles(), _memory(), os.fstat(2).st_size
+        left = {*map(str, temporary.iterdir()), *map(str, Path().glob(".*"))}
+        # The first attempt imports what it needs.
+        left |= open_now - (open_now if handles is None else handles)
+        if length > printed:
+            word, detail = "raw", f"prints {os.pread(2, 500, printed)!r}; {word}: {detail}"
+        elif left:
+            word, detail = "left", f"{left}; {word}: {detail}"
+        elif not SANITIZED and word != "stopped" and usual and memory > usual + GROWTH:
+            word, detail = "grown", f"{(memory - usual) / 2**20:.0f} MiB; {word}: {detail}"
+        handles, usual, printed = open_now, max(memory, usual or 0), length
+        for path in temporary.iterdir():
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+        answers.write(json.dumps([word, detail]) + "\n")
+        answers.flush()
 
 
-# What becomes of a valid input, some of which are computed.
-ACCEPTED = ("accepted", "computed", "failed", "stopped")
+def attempt(part: Part, chance: random.Random) -> tuple[str, str]:
+    """Return what becomes of an attempt; the process ends if it hangs."""
+    interrupt = threading.Timer(part.limit, os.kill, (os.getpid(), signal.SIGINT))
+    faulthandler.dump_traceback_later(part.limit + PATIENCE, exit=True)
+    try:
+        if part.may_stop:
+            interrupt.start()
+        return part.attempt(chance)
+    except KeyboardInterrupt:
+        return "stopped", ""
+    except Exception:  # noqa: BLE001 - that is the question
+        return "crashed", traceback.format_exc()
+    finally:
+        interrupt.cancel()
+        faulthandler.cancel_dump_traceback_later()
 
 
-class Report:
-    """Counts of the findings of each part, kept in a file, so that the campaign goes on."""
+def _handles() -> set[str]:
+    """Return the open files."""
+    found = set()
+    for handle in Path("/proc/self/fd").iterdir():
+        with suppress(OSError):
+            found.add(str(handle.readlink()))
+    return {target for target in found if target.startswith("/") and "/proc/" not in target}
 
-    def __init__(self, seed: int, path: Path | None = None) -> None:
-        self.seed = seed
-        self.path = path
-        self.counts: dict[str, Counter[str]] = {}
-        self.details: list[str] = []
-        if path and path.exists():
-            known = json.loads(path.read_text())
-            if known["seed"] == seed:
-                self.counts = {part: Counter(found) for part, found in known["counts"].items()}
-                self.details = known["details"]
 
-    def run(
-        self, name: str, tries: int, count: int, find: Callable[[list[int]], Iterable[Finding]]
-    ) -> None:
-        """Make a number of a part's tries, spread over all of them, but for those already made."""
-        counts = self.counts.setdefault(name, Counter())
-        numbers: Iterable[int] = range(tries)
-        if count < tries:
-            numbers = random.Random(f"{self.seed}/{name}").sample(range(tries), count)  # noqa: S311
-        seeds = [self.seed * SPAN + number for number in numbers][counts.total() :]
-        kept = time.monotonic()
-        try:
-            for seed, found in zip(seeds, find(seeds), strict=True):
-                counts[found.word] += 1
-                if found.word in FAULTS:
-                    self.details.append(f"{name} {seed}: {found.word}: {found.detail}")
-                if time.monotonic() > kept + INTERVAL:
-                    self._keep()
-                    kept = time.monotonic()
-        finally:
-            self._keep()
+def _memory() -> int:
+    # Unlike `getrusage`, this does not begin with the peak of the parent process.
+    status = Path("/proc/self/status").read_text()
+    return int(status.partition("VmHWM:")[2].split()[0]) * 1024
 
-    def _keep(self) -> None:
-        if self.path:
-            known = {"seed": self.seed, "counts": self.counts, "details": self.details}
-            new = self.path.with_name(self.path.name + ".new")
-            new.write_text(json.dumps(known))
-            new.replace(self.path)
 
-    @property
-    def faults(self) -> int:
-        """Number of findings that must never happen."""
-        return sum(counts[word] for counts in self.counts.values() for word in FAULTS)
+def main() -> int:
+    """Run the campaign, or some attempts of a part; return the exit code."""
+    parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
+    parser.add_argument("--part", action="append", choices=parts(), help="default: all")
+    parser.add_argument("--tries", type=int, help="attempts of each part")
+    parser.add_argument("--seed", type=int, default=0, help="of the first attempt")
+    parser.add_argument("--work", type=json.loads, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    wrong = 0
+    for name in options.part or parts():
+        part = parts()[name]
+        if options.work:
+            work(name, part, options.work)
+            return 0
+        start, counts = time.monotonic(), Counter[str]()
+        first = options.seed
+        for seed, word, detail in find(name, range(first, first + (options.tries or part.tries))):
+            counts[word] += 1
+            if word in FAULTS:
+                wrong += 1
+                print(f"{name} --seed {seed}: {word}: {detail}", flush=True)
+        rest = ", ".join(f"{count} {word}" for word, count in counts.most_common())
+        print(f"{name}: {rest}; {time.monotonic() - start:.0f} s", flush=True)
+    return 1 if wrong else 0
 
-    def computed(self, name: str) -> float:
-        """Return the fraction of the accepted inputs of a part that were computed."""
-        counts = self.counts[name]
-        return counts["computed"] / max(1, sum(counts[word] for word in ACCEPTED))
 
-    def __str__(self) -> str:
-        """Return a table of the counts, and the faults."""
-        lines = [
-            " ".join(["part".ljust(12), "tried".rjust(9), *(f"{w:>8}" for w in FAULTS), " rest"])
-        ]
-        for name, counts in self.counts.items():
-            rest = ", ".join(
-                f"{n} {word}" for word, n in sorted(counts.items()) if word not in FAULTS
-            )
-            if counts["accepted"]:
-                rest += f"; {self.computed(name):.0%} of the accepted are computed"
-            bad = (f"{counts[word]:8}" for word in FAULTS)
-            lines.append(" ".join([f"{name:12}", f"{counts.total():9}", *bad, f" {rest}"]))
-        return "\n".join([*lines, *self.details[:50]])
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,79 +1,59 @@
 """Numbers at the edges: keys over their whole ranges; no wrong number without a word.
 
-What `edge_cases` draws and thud does not refuse is held against `edge_laws` and, of a share,
-`edge_comparisons`.
+What `cases` draws and thud does not refuse keeps laws, and of a share is compared with finer steps
+and with other units.
 """
 
 from __future__ import annotations
 
+import math
 import warnings
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from campaign import Finding, each
-from edge_cases import LUMPED, WEIGHTS, draw_case
-from edge_comparisons import COMPARISONS, is_of_step
-from edge_laws import BALANCE, get_fault
+from cases import LUMPED, draw_case
 
 import thud
+from thud.base._schema import KEYS
 from thud.case.case import case_text
 
 if TYPE_CHECKING:
     import random
-    from collections.abc import Iterable, Sequence
-    from pathlib import Path
+    from collections.abc import Iterable
 
-    from campaign import Check, Tries
+    from thud.base.key import Group, Key
 
-
-def check_models(models: Sequence[str], weights: Sequence[int] = (1,)) -> Check:
-    """Return the check of single drops of models."""
-    return each(lambda chance: _try(chance.choices(models, weights)[0], chance))
+# What balances may miss: of lumped sources, and of finite elements.
+BALANCE, FE_BALANCE = 1e-6, 0.005
 
 
-def check_many(tries: Tries, _: Path) -> Iterable[Finding]:
-    """Try lumped models on a rigid floor by `thud.solve_many`."""
-    models = LUMPED[:2]
-    cases = [draw_case(chance.choices(models, WEIGHTS[:2])[0], chance, 0) for _, chance in tries]
-    found: dict[int, Finding] = {}
-    for name in models:
-        places = [place for place, case in enumerate(cases) if case.model.name == name]
-        found |= zip(places, _many([cases[place] for place in places]), strict=True)
-    return [found[place] for place in range(len(cases))]
+# Changes of contact time and restitution by steps half as long, measured up to 2e-6.
+STEP_CHANGE = 1e-5
+# Powers of mass, length and time in the units of keys.
+POWERS = {"": (0, 0, 0), "m": (0, 1, 0), "kg": (1, 0, 0), "s": (0, 0, 1), "Hz": (0, 0, -1),
+          "Pa": (1, -1, -2), "m/s2": (0, 1, -2), "s/m": (0, -1, 1), "N/m": (1, 0, -2),
+          "N s/m": (1, 0, -1), "m/(N s)": (-1, 0, 1), "m/(N s2)": (-1, 0, 0),
+          "kg/m3": (1, -3, 0)}  # fmt: skip
+SCALED_FLOORS = (None, "infinite_plate", "oscillator", "measured_mobility")
 
 
-def _many(cases: list[thud.Case]) -> Iterable[Finding]:
-    """Yield what becomes of cases of one model."""
-    if not cases:
-        return
-    groups = [(case.ball, case.drop, case.sampling, case.model) for case in cases]
-    values = [{key: value for group in one for key, value in vars(group).items()} for one in groups]
-    columns = {key: [one[key] for one in values] for key in values[0]}
-    many = thud.solve_many(columns, thud.Case(model=type(cases[0].model)()), threads=1)
-    for i, case in enumerate(cases):
-        if many.status[i] != 0:
-            yield Finding("refused")
-            continue
-        velocity = (2 * case.drop.gravity * case.drop.height) ** 0.5
-        rebound = many.impulse[i] / (case.ball.mass * velocity) - 1
-        numbers = (many.contact_time[i], many.peak_force[i], many.max_deflection[i])
-        levels = many.floor_octave[i]
-        right = (
-            all(0 < number < np.inf for number in numbers)
-            and many.restitution[i] >= -BALANCE
-            and abs(rebound - many.restitution[i]) < 3 * BALANCE
-            and many.contact_time[i] <= case.sampling.duration + 1 / case.sampling.sample_rate
-            and np.isfinite(levels).all()
-        )
-        if right and many.restitution[i] <= 1 + BALANCE:
-            yield Finding("computed")
-        elif right and is_of_step(thud.solve(case)):
-            yield Finding("warned")
-        else:
-            yield Finding("wrong", f"{many.restitution[i]}; {case_text(case).decode().split()}")
+def attempt_lumped(chance: random.Random) -> tuple[str, str]:
+    """Try a drop of a lumped model."""
+    return _attempt(chance.choices(list(LUMPED), list(LUMPED.values()))[0], chance)
 
 
-def _try(model: str, chance: random.Random) -> Finding:
+def attempt_modal(chance: random.Random) -> tuple[str, str]:
+    """Try a drop of the modal ball."""
+    return _attempt("modal_ball", chance)
+
+
+def attempt_elements(chance: random.Random) -> tuple[str, str]:
+    """Try a drop of finite elements."""
+    return _attempt("finite_element", chance)
+
+
+def _attempt(model: str, chance: random.Random) -> tuple[str, str]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
@@ -82,10 +62,162 @@ def _try(model: str, chance: random.Random) -> Finding:
             wrong = get_fault(impact)
             if wrong == "rigid: restitution" and is_of_step(impact):
                 wrong = ""
-            if not wrong and chance.random() < (0.1 if model in LUMPED else 0.05):
-                wrong = chance.choice(COMPARISONS)(impact, chance)
+            if not wrong and chance.random() < 0.1:
+                wrong = chance.choice([_finer_steps, _other_units])(impact, chance)
         except thud.ThudError as error:
-            return Finding("NaN", str(error)) if "NaN" in str(error) else Finding("refused")
+            return ("NaN", str(error)) if "NaN" in str(error) else ("refused", "")
     if wrong:
-        return Finding("wrong", f"{wrong}; {case_text(case).decode().split()} {impact.notes}")
-    return Finding("warned" if impact.notes else "computed")
+        return "wrong", f"{wrong}; {case_text(case).decode().split()} {impact.notes}"
+    return ("warned" if impact.notes else "computed"), ""
+
+
+def get_fault(impact: thud.Impact) -> str:
+    """Return which law an answer breaks; empty for none."""
+    for one in filter(None, (impact, impact.on_floor)):
+        broken = [law for law, holds in _laws(one).items() if not holds]
+        if broken:
+            return f"{'on floor' if one is impact.on_floor else 'rigid'}: {', '.join(broken)}"
+    return ""
+
+
+def _laws(impact: thud.Impact) -> dict[str, bool]:
+    """Return which laws an answer keeps."""
+    case, force = impact.case, impact.floor_force
+    elements = isinstance(case.model, thud.FiniteElement)
+    gravity = elements or getattr(case.model, "contact_gravity", False)
+    velocity, step = impact.impact_velocity, 1 / impact.sample_rate
+    momentum, energy = case.ball.mass * velocity, case.ball.mass * velocity**2 / 2
+    balance = FE_BALANCE if elements else BALANCE
+    moves = isinstance(impact, thud.FloorImpact)
+    feeds = getattr(case.model, "momentum_flux", "") == "none" and moves
+    third = [impact.levels("third", force=kind) for kind in ("elastic", "floor")]
+    octave = [impact.levels("octave", force=kind) for kind in ("elastic", "floor")]
+    arrays = (force, impact.elastic_force, impact.deflection, impact.velocity, *third, *octave)
+    total = 10 * np.log10(np.sum(force**2) * step)
+    # A ball that leaves the floor before it is round again is lower than at first touch.
+    fall = case.ball.mass * case.drop.gravity * impact.max_deflection + balance * energy
+    laws = {
+        "numbers are finite": all(np.isfinite(values).all() for values in arrays),
+        "thirds hold no more than all": _energy(third[1]) <= total + 1e-6,
+        "an octave of exact bands is its thirds": impact.case.levels.method != "exact"
+        or abs(_energy(third[1][3:12]) - _energy(octave[1][1:4])) < 1e-3
+        or _energy(octave[1][1:4]) < total - 110,
+        "impulse is the change of momentum": gravity
+        or abs(impact.impulse - momentum * (1 + impact.restitution)) <= 3 * balance * momentum,
+        "samples hold the impulse": abs(force.sum() * step / impact.impulse - 1) <= 0.02,
+        "balances close": max(impact.impulse_residual, impact.energy_residual) <= balance,
+        "restitution": (-1 if moves else 0) - 1e-6 <= impact.restitution <= 1 + 1e-6 or feeds
+        or (gravity and energy * (impact.restitution**2 - 1) <= fall),
+        "contact lasts": 0 < impact.contact_time <= case.sampling.duration + step,
+        "no sample exceeds the peak": elements or force.max() <= impact.peak_force * (1 + 1e-9),
+        "no sample exceeds the deflection": impact.deflection.max()
+        <= impact.max_deflection * (1 + 1e-9),
+    }  # fmt: skip
+    if isinstance(impact, thud.FloorImpact):
+        power = force * impact.floor_velocity
+        # Contact takes or gives some energy within the steps of the modal ball.
+        missing = balance * energy + abs(impact.model_quantities.get("contact_loss", 0.0))
+        spread = step * (
+            np.abs(np.diff(power, prepend=0, append=0)).sum() + 2 * np.abs(power).max()
+        )
+        laws |= {
+            "the floor takes energy": -missing <= impact.floor_work
+            <= energy + missing or gravity,
+            "samples hold the work": abs(power.sum() * step - impact.floor_work)
+            <= spread + balance * energy,
+        }  # fmt: skip
+    return laws
+
+
+def _energy(levels: np.ndarray) -> float:
+    """Return the level of all bands together, dB."""
+    return float(10 * np.log10(np.sum(10 ** (levels / 10))))
+
+
+def _finer_steps(impact: thud.Impact, _: random.Random) -> str:
+    case = impact.case
+    if isinstance(case.model, thud.FiniteElement | thud.ModalBall):
+        return ""
+    finer = thud.solve(_sampled(case, substeps=2 * case.sampling.substeps))
+    for one, other in _pairs(impact, finer):
+        changes = (one.contact_time / other.contact_time - 1, one.restitution - other.restitution)
+        if max(map(abs, changes)) > STEP_CHANGE:
+            return f"half the step changes contact time and restitution by {changes}"
+    return ""
+
+
+def is_of_step(impact: thud.Impact) -> bool:
+    """Return whether a restitution above 1 raises a warning, and an error of the step."""
+    excess = impact.restitution - 1
+    if not any(math.isclose(note.value, excess) for note in impact.notes):
+        return False
+    finer = thud.solve(_sampled(impact.case, substeps=4 * impact.case.sampling.substeps))
+    return abs(finer.restitution - 1) < excess / 4
+
+
+def _other_units(impact: thud.Impact, chance: random.Random) -> str:
+    """Compare with the same drop in other units of mass, length and time (Buckingham)."""
+    case = impact.case
+    scales = [
+        4.0 ** chance.randint(-3, 3),
+        4.0 ** chance.randint(-3, 3),
+        chance.choice([0.5, 1, 2]),
+    ]
+    # The resolution of others is for bands in Hz.
+    if case.model.name not in LUMPED or (case.floor and case.floor.name) not in SCALED_FLOORS:
+        return ""
+    try:
+        scaled = thud.solve(_scaled(case, scales))
+    except thud.InputError:
+        return ""  # a key is outside its range
+    unit = _unit(scales, (1, 1, -2))
+    for one, other in _pairs(impact, scaled):
+        change = np.abs(one.floor_force - other.floor_force / unit).max() / one.peak_force
+        if not change < 1e-6:
+            return f"units scaled by {scales} change the force by {change}"
+    return ""
+
+
+def _scaled(case: thud.Case, scales: list[float]) -> thud.Case:
+    groups = {}
+    for name in ("ball", "drop", "sampling", "model", "floor"):
+        group = getattr(case, name)
+        if group is None:
+            continue
+        owner = group.name if name in ("model", "floor") else ""
+        keys = {
+            key.name: key for key in KEYS if key.owner == owner and (owner or key.group == name)
+        }
+        values = {one.name: getattr(group, one.name) for one in fields(group)}
+        for word, value in values.items():
+            unit = _unit(scales, _powers(group, keys[word]))
+            if isinstance(value, tuple | list):
+                values[word] = [unit * one for one in value]
+            elif isinstance(value, float):
+                values[word] = unit * value
+        groups[name] = type(group)(**values)
+    return replace(case, **groups)
+
+
+def _powers(group: Group, key: Key) -> tuple[float, float, float]:
+    """Return the powers of mass, length and time in the unit of a key."""
+    if key.name == "stiffness" and isinstance(group, thud.HuntCrossley):
+        return 1, 1 - group.exponent, -2
+    if key.name == "carcass_stiffness" and isinstance(group, thud.TwoMass):
+        return 1, 1 - group.carcass_exponent, -2  # it is stated at 20 mm
+    return POWERS[key.unit]
+
+
+def _unit(scales: list[float], powers: tuple[float, float, float]) -> float:
+    return math.prod(scale**power for scale, power in zip(scales, powers, strict=True))
+
+
+def _sampled(case: thud.Case, **values: float) -> thud.Case:
+    return replace(case, sampling=replace(case.sampling, **values))
+
+
+def _pairs(one: thud.Impact, other: thud.Impact) -> Iterable[tuple[thud.Impact, thud.Impact]]:
+    """Return the answers on rigid floors, and on floors that move where both have one."""
+    yield one, other
+    if one.on_floor and other.on_floor:
+        yield one.on_floor, other.on_floor

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import os
 import shutil
 import subprocess
@@ -10,10 +9,6 @@ import sysconfig
 from functools import cache
 from pathlib import Path
 from tempfile import mkdtemp
-
-ERRORS = tuple(str(number) for number in (errno.ENOSPC, errno.EIO, errno.EINTR, errno.EMFILE))
-# Seconds that a run may take.
-PATIENCE = 60
 
 
 def executable() -> str:
