@@ -1,15 +1,17 @@
 """Model of a recorder: pulses with known levels, and the chain from force plate to file.
 
 It shares nothing with thud but the definitions of the measured quantities. Pulses are sums of terms
-with closed transforms; what is true of them follows from Gauss quadrature. Plate and filters are
+with closed transforms, from which their levels, impulse and peak follow. Plate and filters are
 applied in the frequency domain on a fine grid, of which the record takes every n-th sample.
 """
 
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
@@ -19,9 +21,10 @@ import scipy.signal
 import scipy.special
 import soundfile
 
-if TYPE_CHECKING:
-    from pathlib import Path
+sys.path.insert(0, str(Path(__file__).parents[1] / "driver"))
+from synthetic import coloured_noise
 
+if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
@@ -40,6 +43,8 @@ MIN_LEVEL = 6.0
 # Least rate of the grid on which the chain is computed, Hz, and its length around a pulse, s.
 FINE_RATE = 200_000.0
 BEFORE, AFTER = 0.05, 0.45
+# Colours of noise by the negative slope of their spectra.
+COLOURS = ("white", "pink", "brown")
 
 
 # --- pulses -----------------------------------------------------------------------------------
@@ -162,35 +167,17 @@ class Pulse:
         """Return the transform in closed form, N s."""
         return np.asarray(sum(a * term.transform(frequency) for a, term in self.terms))
 
-    @cached_property
-    def rule(self) -> tuple[Array, Array]:
-        """Nodes and weights in time, graded to both ends, where powers of time begin."""
-        graded = 0.1 * 0.2 ** np.arange(9, -1, -1.0)
-        inner = np.linspace(0.1, 0.9, 13)[1:-1]
-        edges = [0, *graded, *inner, *(1 - graded[::-1]), 1]
-        bursts = [term for _, term in self.terms if isinstance(term, Cosine)]
-        ends = [(t.middle + s * t.width / 2) / self.duration for t in bursts for s in (-1, 1)]
-        edges = np.unique([*edges, *(end for end in ends if 0 < end < 1)])
-        return panels(self.duration * edges, 16)
-
-    def quadrature(self, frequency: Array) -> Complex:
-        """Return the transform by Gauss quadrature, N s."""
-        nodes, weights = self.rule
-        waves = np.exp(-2j * np.pi * np.outer(frequency, nodes))
-        return np.asarray(waves @ (weights * self.force(nodes)))
-
     def levels(self) -> Array:
         """Return the force exposure levels in the octaves, dB re 1 N and 1 s."""
         ends = np.append(MIDDLES / EDGE, MIDDLES[-1] * EDGE)
         nodes, weights = panels(ends, 24)
-        energy = 2 * weights * np.abs(self.quadrature(nodes)) ** 2
+        energy = 2 * weights * np.abs(self.transform(nodes)) ** 2
         return 10 * np.log10(energy.reshape(len(MIDDLES), -1).sum(1))
 
     @property
     def impulse(self) -> float:
         """Time integral, N s."""
-        nodes, weights = self.rule
-        return float(weights @ self.force(nodes))
+        return float(self.transform(np.zeros(1))[0].real)
 
     def contact(self) -> tuple[float, float]:
         """Return the first and the last time at 1 % of the peak, s from first touch.
@@ -222,7 +209,7 @@ class Pulse:
     def peak(self) -> float:
         """Return the maximum of the force below 1.25 kHz, N."""
         nodes, weights = panels(np.linspace(0, LIMIT, 13), 24)
-        spectrum = 2 * weights * self.quadrature(nodes)
+        spectrum = 2 * weights * self.transform(nodes)
         time = np.linspace(0, self.duration, 201)
 
         def low(t: Array) -> Array:
@@ -293,7 +280,7 @@ def random_pulse(kind: str, impulse: float, rng: np.random.Generator) -> Pulse:
         ripple = Cosine(middle, width, rng.uniform(300, 600), rng.uniform(0, 2 * np.pi))
         wanted = 10 ** (rng.uniform(8, 15) / 10) / impulse**2
         parts = [base, Pulse(base.duration, ((1.0, ripple),))]
-        first, second = (part.quadrature(nodes) for part in parts)
+        first, second = (part.transform(nodes) for part in parts)
         areas = [part.impulse for part in parts]
         energies = [
             2 * float(weights @ (x * y.conj()).real)
@@ -441,21 +428,6 @@ class Filter:
         # Symmetric, so that its delay is taken out: a raised-cosine transition, 10 % wide.
         x = np.clip((np.abs(s) - 0.907) / 0.186, 0, 1)
         return np.asarray(0.5 + 0.5 * np.cos(np.pi * x), dtype=complex)
-
-
-def coloured_noise(
-    n: int, rate: float, deviation: float, slope: float, rng: np.random.Generator
-) -> Array:
-    """Return noise of a density proportional to f**-slope, with a deviation above 1 Hz, N."""
-    # Longer than the record, since the transform is periodic.
-    length = scipy.fft.next_fast_len(max(2 * n, int(rate)), real=True)
-    frequency = np.fft.rfftfreq(length, 1 / rate)
-    size = np.maximum(frequency, 0.5 * frequency[1]) ** (-slope / 2)
-    values = size * (rng.normal(size=len(size)) + 1j * rng.normal(size=len(size)))
-    values[0] = 0
-    expected = 4 * float((size[frequency >= 1] ** 2).sum()) / length**2
-    noise = scipy.fft.irfft(values, length)[:n]
-    return np.asarray(noise * deviation / math.sqrt(expected))
 
 
 @dataclass(frozen=True)
@@ -621,7 +593,7 @@ def electric(
             values += chain.tremor / math.sqrt(3) * np.sin(phase)
     for deviation, slope in chain.noises:
         if deviation:
-            values += coloured_noise(n, rate, deviation, slope, rng)
+            values += coloured_noise(n, rate, deviation, COLOURS[int(slope)], rng)
     if chain.spikes:
         where = np.flatnonzero(rng.uniform(size=n) < chain.spikes / rate)
         values[where] += chain.spike_size * rng.choice([-1, 1], len(where))
@@ -689,7 +661,7 @@ class Cells:
     def volts(self, force: Array, chain: Chain, rng: np.random.Generator) -> Array:
         """Return the voltages of the cells, shape (4, n_sample), with noise of their own."""
         deviation = sum(size for size, _ in chain.noises) / 2
-        noise = [coloured_noise(len(force), chain.rate, deviation, 0.0, rng) for _ in range(4)]
+        noise = [coloured_noise(len(force), chain.rate, deviation, "white", rng) for _ in range(4)]
         forces = self.shares()[:, None] * force + np.array(noise)
         return np.array(self.sensitivities)[:, None] * forces + np.array(self.offsets)[:, None]
 

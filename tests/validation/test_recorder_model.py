@@ -13,12 +13,14 @@ import scipy.signal
 import soundfile
 from threadpoolctl import threadpool_limits
 
+from thud.base.note import Note
 from thud.impact.contact_time import contact_span
 from thud.level.levels import low_pass
 
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[1] / "bench"))
 import recorder
+from recorder_conditions import Condition, conditions
 from recorder_model import (
     FINE_RATE,
     GRAVITY,
@@ -31,7 +33,6 @@ from recorder_model import (
     Pulse,
     SinePower,
     bounces,
-    coloured_noise,
     convert,
     droop,
     drop_pulse,
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
 
 # Threads only wait for each other in products of this size.
 pytestmark = pytest.mark.usefixtures("one_thread")
+CONDITIONS = conditions()
 FREQUENCIES = np.linspace(5.0, 1250.0, 60)
 
 
@@ -56,11 +58,14 @@ def one_thread() -> Iterator[None]:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_quadrature_of_a_pulse_is_its_closed_transform(kind: str) -> None:
+def test_closed_transform_of_a_pulse_is_that_of_its_samples(kind: str) -> None:
     ball = Ball(restitution=0.8, deformation=0.002)
     pulse, truth = drop_pulse(kind, ball, np.random.default_rng(3))
-    errors = np.abs(pulse.transform(FREQUENCIES) - pulse.quadrature(FREQUENCIES))
-    assert errors.max() < 1e-7 * truth.impulse
+    step = 1e-6
+    time = np.arange(0, pulse.duration, step)
+    waves = np.exp(-2j * np.pi * np.outer(FREQUENCIES, time))
+    errors = np.abs(pulse.transform(FREQUENCIES) - waves @ pulse.force(time) * step)
+    assert errors.max() < 1e-6 * truth.impulse
     # The impulse is the change of momentum, and the weight of the ball during the contact.
     change = ball.mass * (ball.velocity * (1 + ball.restitution) + GRAVITY * pulse.duration)
     assert math.isclose(truth.impulse, change, rel_tol=1e-9)
@@ -113,20 +118,6 @@ def test_droop_of_a_step_is_exponential() -> None:
     np.testing.assert_allclose(droop(np.ones(5000), 1e3, 2.0), expected, rtol=5e-4)
 
 
-def test_noise_has_its_deviation_and_slope() -> None:
-    rng = np.random.default_rng(1)
-    parts = (
-        (100 - 10) / (2000 - 1),
-        math.log(100 / 10) / math.log(2000 / 1),
-        (1 / 10 - 1 / 100) / (1 - 1 / 2000),
-    )
-    for slope, part in enumerate(parts):
-        noise = coloured_noise(400_000, 4e3, 3.0, float(slope), rng)
-        frequency, density = scipy.signal.welch(noise, 4e3, nperseg=8000)
-        inside = (frequency >= 10) & (frequency <= 100)
-        assert abs(float(np.trapezoid(density[inside], frequency[inside])) / 9 / part - 1) < 0.1
-
-
 def test_flight_ends_where_the_center_returns() -> None:
     ball = Ball(restitution=0.8, deformation=0.002)
     pulse, _ = drop_pulse("sine", ball, np.random.default_rng(5))
@@ -152,49 +143,64 @@ def test_files_hold_the_codes(tmp_path: Path) -> None:
 
 
 def test_errors_are_silent_unless_a_warning_concerns_them() -> None:
-    value = recorder.Value(0.5, 0.01, concerned=False)
+    value = recorder.Value(0.5, 0.01)
     assert value.is_silent("500 Hz")
     assert not value.is_inside()
     assert not recorder.Value(0.5, 0.01, concerned=True).is_silent("500 Hz")
-    assert not recorder.Value(0.5, 0.2, concerned=False).is_silent("500 Hz")
-    assert not recorder.Value(0.05, 0.001, concerned=False).is_silent("500 Hz")
+    assert not recorder.Value(0.5, 0.2).is_silent("500 Hz")
+    assert not recorder.Value(0.05, 0.001).is_silent("500 Hz")
     # One degree of freedom: the quantile of 97.5 % is 12.7.
-    assert recorder.Value(0.126, 0.01, concerned=False, freedom=1).is_inside()
-    assert not recorder.Value(0.128, 0.01, concerned=False, freedom=1).is_inside()
-    ringing = "the plate keeps ringing: its resonance affects levels, peaks and contact time"
-    assert recorder.concern(ringing) == {*recorder.LEVELS, "peak", "contact"}
-    assert recorder.concern("the octave of 500 Hz may be off by 0.3 dB") == {"500 Hz"}
-    missing = "uncertainty not stated, and not included: mass, drop height"
+    assert recorder.Value(0.126, 0.01, freedom=1).is_inside()
+    assert not recorder.Value(0.128, 0.01, freedom=1).is_inside()
+    assert recorder.concern(Note("plate_rings")) == {*recorder.LEVELS, "peak", "contact"}
+    missing = Note("uncertainty_not_stated", others={"names": "mass, drop height"})
     assert recorder.concern(missing) == {"restitution"}
-    assert recorder.concern("there are 2.0 ms of background") == set(recorder.QUANTITIES)
+    assert recorder.concern(Note("short_background")) == set(recorder.MATERIAL)
 
 
 def test_coverage_is_met_within_chance() -> None:
     def covered(inside: int, count: int) -> bool:
-        values = [
-            recorder.Value(1.0, 1.0 if k < inside else 0.1, concerned=False) for k in range(count)
-        ]
-        outcomes = [recorder.Outcome(0, k, {"peak": value}) for k, value in enumerate(values)]
-        ((line, met),) = recorder.coverage(outcomes)
-        assert line.endswith("missed") is not met
+        values = [recorder.Value(1.0, 1.0 if k < inside else 0.1) for k in range(count)]
+        outcomes = [recorder.Outcome(CONDITIONS[0], 0, {"peak": value}) for value in values]
+        ((_, met),) = recorder.coverage(outcomes)
         return met
 
-    assert covered(95, 100)
-    assert covered(90, 100)
-    assert covered(100, 100)
-    assert not covered(88, 100)
-    assert not covered(500, 500)
+    counts = ((95, 100), (90, 100), (100, 100), (88, 100), (500, 500))
+    assert [covered(*pair) for pair in counts] == [True, True, True, False, False]
 
 
-@pytest.mark.parametrize("group", list(dict.fromkeys(c.group for c in recorder.conditions())))
-def test_each_part_of_the_bench_measures(group: str) -> None:
-    index = next(k for k, c in enumerate(recorder.conditions()) if c.group == group)
-    outcome = recorder.measure((index, 0))
-    condition = recorder.conditions()[index]
-    assert outcome.refusal or outcome.unknown_key or outcome.values
-    if condition.told and outcome.values:
+@pytest.mark.parametrize("group", {condition.group: 0 for condition in CONDITIONS})
+def test_each_part_is_measured(group: str) -> None:
+    condition = next(one for one in CONDITIONS if one.group == group)
+    outcome = recorder.measure(condition, 0)
+    assert outcome.values or (outcome.refusal and condition.may_be_refused)
+    if condition.told:
         # Nothing is grossly off, whether or not it is inside its interval.
-        assert all(abs(outcome.values[q].error) < 1 for q in outcome.values), outcome
-    table = list(recorder.table([outcome], lambda _: group))
-    assert len(table) == 3
-    assert group in table[-1]
+        assert all(abs(value.error) < 1 for value in outcome.values.values()), outcome
+    assert not outcome.silent
+    assert len(list(recorder.summary([outcome]))) == 3
+
+
+FAULTS = [condition for condition in CONDITIONS if condition.group == "samples"]
+CLEAN = [
+    Condition("samples", name, chain=Chain(25_600.0), filter_told=told)
+    for name, told in (("none", True), ("none, filter not stated", False))
+]
+
+
+@pytest.mark.parametrize("condition", FAULTS, ids=lambda one: one.name)
+def test_no_fault_of_samples_is_silent_and_material(condition: Condition) -> None:
+    for seed in range(2):
+        outcome = recorder.measure(condition, seed)
+        assert not outcome.silent
+        said = " ".join((*outcome.warnings, outcome.refusal))
+        causes = condition.cause.split("|")
+        assert any(cause in said for cause in causes), (seed, said)
+
+
+@pytest.mark.parametrize("condition", CLEAN, ids=lambda one: one.name)
+def test_records_without_a_fault_have_no_warning(condition: Condition) -> None:
+    for seed in range(2):
+        outcome = recorder.measure(condition, seed)
+        assert not outcome.refusal
+        assert set(outcome.warnings) <= {"no_bounce", "peaks_unknown", "filter_assumed"}

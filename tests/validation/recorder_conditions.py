@@ -1,0 +1,511 @@
+"""Conditions of the recorder model: what is recorded, with which fault, and what is stated."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from functools import cache
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.signal
+from recorder_model import KINDS, Cells, Chain, Filter, Mode, Scene, Weight
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from recorder_model import Array
+
+    # Values, N, samples per second, first and stop index of the contact, random numbers.
+    Fault = Callable[[Array, float, int, int, np.random.Generator], Array]
+
+# Plate, amplifier and filter where a condition has no other: stated unless it is about them. Flat
+# up to FLAT, Hz, and static.
+FLAT = 20e3
+STATIC = 1e6
+# Groups whose faults may be refused: no measurement can be right, or known to be right.
+REFUSABLE = {"clipping", "duplicates", "channels", "offset step", "calibrate", "samples"}
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What is recorded, and what the configuration states of it.
+
+    Attributes
+    ----------
+    group, name : str
+        Part of the campaign, and the condition.
+    told : bool
+        Whether everything is stated.
+    chain, scene : Chain, Scene
+        Recorder, and what it goes through.
+    kind : str
+        Kind of the pulse; empty: each in turn.
+    ball : mapping
+        Attributes of the ball that are not random.
+    config : mapping
+        Keys of the configuration, besides those of any recording.
+    uncertainties : mapping
+        Standard uncertainties that are stated, and from which errors are drawn: calibration
+        (relative), mass, kg, height, m, f0 and cutoff of the filter (relative).
+    cells : Cells or None
+        Load cells in channels of their own.
+    plate_told, filter_told : bool
+        Whether plate and filter are stated.
+    files : str
+        ``"one"``, ``"table"``, or a kind of copies.
+    weight : Weight or None
+        Record of a mass for `calibrate` in place of a drop.
+    taps : tuple of (float, float)
+        Taps on the plate for `calibrate --tap`: duration, s, and peak, N.
+    refusable : bool
+        Whether it may be refused, besides faults of `REFUSABLE`.
+    fault : callable or None
+        Damages the samples.
+    cause : str
+        Codes of warnings or words of refusals, one of which names the fault.
+    """
+
+    group: str
+    name: str
+    told: bool = True
+    chain: Chain = field(default_factory=Chain)
+    scene: Scene = field(default_factory=Scene)
+    kind: str = ""
+    ball: Mapping[str, float] = field(default_factory=dict)
+    config: Mapping[str, Any] = field(default_factory=dict)
+    uncertainties: Mapping[str, float] = field(default_factory=dict)
+    cells: Cells | None = None
+    plate_told: bool = True
+    filter_told: bool = True
+    files: str = "one"
+    weight: Weight | None = None
+    taps: tuple[tuple[float, float], ...] = ()
+    refusable: bool = False
+    fault: Fault | None = None
+    cause: str = ""
+
+    @property
+    def drops(self) -> int:
+        """Number of different drops in the files."""
+        return {"two drops": 2, "five drops": 5}.get(self.files, 1)
+
+    @property
+    def may_be_refused(self) -> bool:
+        """Whether a refusal is right."""
+        return self.refusable or (not self.told and self.group in REFUSABLE)
+
+
+@cache
+def conditions() -> tuple[Condition, ...]:
+    """Return all conditions."""
+    found: list[Condition] = []
+
+    def add(group: str, name: str, **more: Any) -> None:  # noqa: ANN401 - of `Condition`
+        found.append(Condition(group, name, **more))
+
+    for part in _PARTS:
+        part(add)
+    return tuple(found)
+
+
+def _surroundings(add: Callable[..., None]) -> None:
+    """Add clean records, noise, hum, drift, spikes."""
+    for kind, rate in product(KINDS, (8e3, 51.2e3)):
+        add("clean", f"{kind}, {rate / 1e3:g} kHz", chain=Chain(rate), kind=kind)
+    for rate in (2.5e3, 4e3, 10e3, 16e3, 25e3, 44.1e3, 96e3, 192e3):
+        add("clean", f"{rate / 1e3:g} kHz", chain=Chain(rate))
+    for slope, deviation in product((0.0, 1.0, 2.0), (0.2, 1.5, 5.0, 15.0, 50.0)):
+        chain = Chain(25e3, noises=((deviation, slope),))
+        add("noise", f"1/f{slope:g}, {deviation:g} N", chain=chain)
+    for sizes in ((1.0, 2.0, 4.0), (5.0, 5.0, 5.0)):
+        noises = tuple((size, float(slope)) for slope, size in enumerate(sizes))
+        add("noise", f"white, pink, brown {sizes} N", chain=Chain(noises=noises))
+    chains: dict[str, dict[str, Any]] = {
+        **{f"hum {f:g} Hz, {a:g} N": {"hum": (f, a)}
+           for f, a in product((50.0, 60.0), (2.0, 10.0, 60.0))},
+        **{f"tremor {size:g} N": {"tremor": size} for size in (2.0, 10.0)},
+        **{f"drift {size:g} N/s": {"drift": size} for size in (5.0, 50.0)},
+        **{f"offset {size:g} N": {"offset": size} for size in (-300.0, 1000.0)},
+        **{f"{rate:g} spikes/s of {size:g} N": {"spikes": rate, "spike_size": size}
+           for rate, size in ((20.0, 50.0), (100.0, 20.0), (5.0, 300.0))},
+    }  # fmt: skip
+    for name, keys in chains.items():
+        add("surroundings", name, chain=Chain(**keys))
+    config = {"polarity": "negative"}
+    add("surroundings", "negative", chain=Chain(negative=True), config=config)
+
+
+def _instruments(add: Callable[..., None]) -> None:
+    """Add droop, and plates that are stated or not."""
+    for tau, told in product((0.2, 0.5, 1.0, 2.0, 5.0, 20.0), (True, False)):
+        config = {"plate": {"time_constant": tau if told else STATIC}}
+        name = f"time constant {tau:g} s{'' if told else ', untold'}"
+        add("droop", name, told=told, chain=Chain(25e3, time_constant=tau), config=config)
+
+    def plate(*modes: Mode, rate: float = 51.2e3, **stated: float) -> dict[str, Any]:
+        found = {"chain": Chain(rate, modes)} if modes else {}
+        return found | ({"config": {"plate": stated}} if stated else {"plate_told": False})
+
+    known = {"uncertainties": {"f0": 0.003}}
+    for f0, q in product((1050.0, 1200.0, 1600.0, 2100.0, 3000.0), (3.0, 8.0, 25.0, 60.0)):
+        add("plate", f"{f0:g} Hz, Q {q:g}", **plate(Mode(f0, q), f0=f0, Q=q), **known)
+    more = plate(Mode(1600.0, 25.0), rate=10e3, f0=1600.0, Q=25.0)
+    add("plate", "1600 Hz, Q 25, 10 kHz", **more, **known)
+    more = plate(Mode(900.0, 25.0), f0=900.0, Q=25.0)
+    add("plate", "900 Hz, Q 25", **more, refusable=True)
+
+    def untold(name: str, more: dict[str, Any]) -> None:
+        add("plate untold", name, told=False, **more)
+
+    for f0, q in product((900.0, 1000.0, 1200.0, 1600.0, 2200.0, 3000.0), (3.0, 8.0, 25.0, 60.0)):
+        untold(f"{f0:g} Hz, Q {q:g}", plate(Mode(f0, q)))
+    for f0, q in ((1200.0, 10.0), (2000.0, 20.0), (3000.0, 30.0)):
+        untold(f"stated {f0:g} Hz not there", plate(f0=f0, Q=q, f0_uncertainty=0.005))
+    for ratio in (0.9, 1.1):
+        more = plate(Mode(1600.0, 25.0), f0=1600.0 * ratio, Q=25.0, f0_uncertainty=0.005)
+        untold(f"1600 Hz stated times {ratio:g}", more)
+    for f1, f2, share in ((1600.0, 2700.0, 0.15), (1200.0, 1900.0, 0.3), (2000.0, 2600.0, -0.1)):
+        modes = Mode(f1, 25.0, 1 - share), Mode(f2, 30.0, share)
+        name = f"second mode {f2:g} Hz of {share:g}"
+        untold(name, plate(*modes, f0=f1, Q=25.0, f0_uncertainty=0.005))
+        untold(f"{name}, no plate stated", plate(*modes))
+    untold("1200 Hz, Q 8, 8 kHz", plate(Mode(1200.0, 8.0), rate=8e3))
+    noisy = Chain(noises=((5.0, 0.0),), modes=(Mode(1200.0, 25.0),))
+    untold("1200 Hz, Q 25, noise 5 N", {"chain": noisy, "plate_told": False})
+    untold("9 kHz, Q 30", plate(Mode(9000.0, 30.0)))
+    untold("flat, not stated", plate())
+
+
+def _filters(add: Callable[..., None]) -> None:
+    """Add filters that are stated or not, and converters."""
+    cases = [(51.2e3, "bessel", 4, cutoff) for cutoff in (1.5e3, 2e3, 3e3, 5e3, 10e3)]
+    cases += [(51.2e3, "butterworth", 4, cutoff) for cutoff in (1e3, 1.5e3, 2.5e3, 5e3)]
+    cases += [(rate, "butterworth", 4, rate / 4) for rate in (2.5e3, 5e3, 10e3)]
+    cases += [(51.2e3, "bessel", 2, 3e3), (51.2e3, "butterworth", 8, 1.2e3)]
+    for rate, kind, order, cutoff in cases:
+        chain = Chain(rate, filter=Filter(kind, order, cutoff))
+        name = f"{kind} {order}, {cutoff:g} Hz, {rate / 1e3:g} kHz"
+        config = {"filter": {"kind": kind, "order": order, "cutoff": cutoff}}
+        add("filter", name, chain=chain, config=config, uncertainties={"cutoff": 0.005})
+        add("filter untold", name, told=False, chain=chain, filter_told=False)
+    chains = {f"flat, not stated, {rate / 1e3:g} kHz": Chain(rate) for rate in (2.5e3, 51.2e3)}
+    for rate in (2.5e3, 5e3, 25e3):
+        elliptic = Filter("elliptic", 6, 0.4 * rate)
+        chains[f"elliptic 6, {rate / 1e3:g} kHz"] = Chain(rate, filter=elliptic)
+    for name, chain in chains.items():
+        add("filter untold", name, told=False, chain=chain, filter_told=False)
+
+    few = Chain(25e3, full_scale=4e3, noises=((0.3, 0.0),))
+    for full_scale, bits in product((4e3, 20e3), (8, 10, 12, 14, 16, 24)):
+        chain = replace(few, bits=bits, full_scale=full_scale)
+        add("quantization", f"{bits} bit, ±{full_scale / 1e3:g} kN", chain=chain)
+    for bits in (8, 12):
+        chain = Chain(bits=bits, full_scale=4e3, noises=((0.01, 0.0),), offset=0.0)
+        add("quantization", f"{bits} bit, no noise, no offset", chain=chain)
+    for bits, full_scale in ((8, 4e3), (12, 20e3)):
+        chain = replace(few, bits=bits, full_scale=full_scale)
+        add("quantization", f"{bits} bit as a table, V", chain=chain, files="table")
+
+
+def _samples(add: Callable[..., None]) -> None:
+    """Add clipping, jumps of the offset, and faults of samples."""
+    for scale in (900.0, 600.0):
+        chain = Chain(full_scale=scale, offset=0.0)
+        add("clipping", f"±{scale:g} N", told=False, chain=chain)
+    places = {"at the middle": (0.5, 0.0), "over the contact": (0.0, 1.0)}
+    steps = [(size, *item) for size in (2.0, 15.0, 60.0, -30.0) for item in places.items()]
+    steps += [(15.0, "at first touch", (0.0, 0.0)), (15.0, "at release", (1.0, 0.0))]
+    for size, name, place in steps:
+        add("offset step", f"{size:g} N {name}", told=False, scene=Scene(step=(size, *place)))
+
+    quiet = Chain(25_600.0, noises=((0.3, 0.0),), offset=0.0)
+    silent, held = "constant_background", "is held|constant_background"
+    clipped = "drop_like_bounce|restitution_impossible|restitutions_differ"
+    faults: dict[str, tuple[Fault, str, Chain]] = {
+        "packets of 2 ms exchanged": (_exchange, "jump", Chain(25_600.0)),
+        "3 ms held over the touch": (_hold, held, Chain(25_600.0)),
+        "zero outside, offset 12 N": (_silence, silent, replace(quiet, offset=12.0)),
+        "zero outside, offset 60 N": (_silence, silent, replace(quiet, offset=60.0)),
+        "gate of 40 N": (_gate, silent, quiet),
+        "needles of 60 N": (_add_needles, "spikes", Chain(25_600.0)),
+        "missing codes of 8 N": (_without_bit(3), held, quiet),
+        "missing codes of 32 N": (_without_bit(5), held, quiet),
+        "noise of 1 % of the force": (_multiply_noise(0.01), "", Chain(25_600.0)),
+        "noise of 5 % of the force": (_multiply_noise(0.05), "", Chain(25_600.0)),
+        "amplifier up to 900 N": (_saturate(900.0), clipped, Chain(25_600.0)),
+        "amplifier up to 500 N": (_saturate(500.0), clipped, Chain(25_600.0)),
+        "line over 3 ms": (_draw_line, "filled by a line|jump", Chain(25_600.0)),
+    }
+    scene = Scene(before=0.3, after=0.2, bounces=1)
+    for name, (fault, cause, chain) in faults.items():
+        add("samples", name, told=False, chain=chain, scene=scene, fault=fault, cause=cause)
+    filtered: dict[str, tuple[Fault, str, float]] = {
+        "multiplexed cells": (_multiplex, "aliasing", 25_600.0),
+        "multiplexed cells, 5 kHz": (_multiplex, "aliasing", 5e3),
+        "2 kHz drawn up to 48 kHz": (_draw_up, "noise_ends", 48e3),
+        "mean over 1 ms": (_average, "noise_ends", 25_600.0),
+        "low-pass of 700 Hz": (_low_pass, "noise_ends", 25_600.0),
+    }
+    for name, (fault, cause, rate) in filtered.items():
+        add("samples", name, told=False, chain=Chain(rate), scene=scene, fault=fault, cause=cause,
+            filter_told=False)  # fmt: skip
+
+
+def _exchange(values: Array, rate: float, first: int, stop: int, rng: np.random.Generator) -> Array:
+    """Exchange two packets of 2 ms of the contact."""
+    size = int(2e-3 * rate)
+    start = int(rng.integers(first, stop - 2 * size))
+    values[start : start + 2 * size] = np.roll(values[start : start + 2 * size], size)
+    return values
+
+
+def _hold(values: Array, rate: float, first: int, _: int, rng: np.random.Generator) -> Array:
+    """Hold a sample for 3 ms around the touch."""
+    start = first - int(rng.uniform(0.1, 0.9) * 3e-3 * rate)
+    values[start : start + int(3e-3 * rate)] = values[start]
+    return values
+
+
+def _draw_line(
+    values: Array, rate: float, first: int, stop: int, rng: np.random.Generator
+) -> Array:
+    """Draw a line over 3 ms of the contact."""
+    size = int(3e-3 * rate)
+    start = int(rng.integers(first - size // 2, stop - size // 2))
+    values[start : start + size] = np.linspace(values[start], values[start + size], size)
+    return values
+
+
+def _silence(values: Array, rate: float, first: int, stop: int, _: np.random.Generator) -> Array:
+    """Set zero outside the contact with its margins."""
+    values[: first - int(2e-3 * rate)] = 0.0
+    values[stop + int(3e-3 * rate) :] = 0.0
+    return values
+
+
+def _gate(values: Array, *_: object) -> Array:
+    """Set zero what is below 40 N."""
+    return np.where(np.abs(values) < 40.0, 0.0, values)
+
+
+def _add_needles(values: Array, rate: float, _: int, __: int, rng: np.random.Generator) -> Array:
+    """Add a sample of 60 N each 10 ms."""
+    period = int(0.01 * rate)
+    values[int(rng.integers(period)) :: period] += 60.0
+    return values
+
+
+def _without_bit(bit: int) -> Fault:
+    """Round to 1 N without a bit."""
+    return lambda values, *_: (np.rint(values).astype(int) & ~(1 << bit)).astype(float)
+
+
+def _multiply_noise(share: float) -> Fault:
+    """Add noise in proportion to the force."""
+    return lambda values, *more: values * (1 + share * more[-1].normal(size=len(values)))
+
+
+def _multiplex(values: Array, _: float, __: int, ___: int, rng: np.random.Generator) -> Array:
+    """Take each sample from the next of four cells."""
+    shares = 1 + rng.uniform(-0.3, 0.3, 4)
+    return values * np.resize(4 * shares / shares.sum(), len(values))
+
+
+def _draw_up(values: Array, rate: float, _: int, __: int, rng: np.random.Generator) -> Array:
+    """Take samples at 2 kHz and lines between them."""
+    time = np.arange(len(values)) / rate
+    coarse = np.arange(rng.uniform(0, 5e-4), time[-1], 5e-4)
+    return np.interp(time, coarse, np.interp(coarse, time, values))
+
+
+def _average(values: Array, rate: float, *_: object) -> Array:
+    """Average the samples with the noise over 1 ms."""
+    width = int(1e-3 * rate)
+    return np.convolve(values, np.full(width, 1 / width), mode="same")
+
+
+def _low_pass(values: Array, rate: float, *_: object) -> Array:
+    """Low-pass the samples with the noise."""
+    sections = scipy.signal.butter(4, 700.0, fs=rate, output="sos")
+    return np.asarray(scipy.signal.sosfiltfilt(sections, values))
+
+
+def _saturate(limit: float) -> Fault:
+    """Let the amplifier saturate softly."""
+    return lambda values, *_: limit * np.tanh(values / limit)
+
+
+def _scenes(add: Callable[..., None]) -> None:
+    """Add steps and taps, short backgrounds, and bounces."""
+    near = tuple((begin, 0.015, 25.0) for begin in (-2.6, -2.0, -1.4))
+    walk = ((-3.5, 0.65, 750.0), (-2.9, 0.65, 760.0))
+    back = ((1.8, 0.7, 780.0), (2.4, 0.7, 780.0))
+    stood, left, leaves = (-10.0, 1.0, 750.0), (-1.5, 0.4, -750.0), (2.0, 0.4, -750.0)
+    laid = ((-3.5, 0.08, 24.5), (-2.9, 0.1, -24.5), (-2.2, 0.05, 40.0), (-1.9, 0.06, -40.0))
+    caught = ((0.95, 0.15, 60.0), (1.4, 0.3, -60.0))
+    bumps = (40.0, 150.0, 80.0, 200.0, 60.0, 120.0, 90.0, 180.0, 50.0, 70.0)
+    handled = tuple((0.3 * k - 3.6, 0.006 + 0.0015 * k, peak) for k, peak in enumerate(bumps))
+    heels = ((-3.45, 0.025, 250.0), (-2.85, 0.03, 300.0))
+    four = tuple((begin, 0.012, 150.0) for begin in (-2.0, -1.5, 1.4, 1.9))
+    scenes = {
+        "steps beside the plate": Scene(before=3.0, taps=near),
+        "steps on the plate before": Scene(before=4.0, treads=walk),
+        "a man on the plate, steps off before": Scene(before=3.0, loads=(stood, left)),
+        "a man steps off after": Scene(before=1.0, after=4.0, loads=(stood, leaves)),
+        "a man steps on after": Scene(before=1.0, after=4.0, treads=back),
+        "handling before": Scene(before=4.0, loads=laid, taps=((-3.4, 0.02, 30.0),)),
+        "tap of 60 N before": Scene(before=2.0, taps=((-1.2, 0.004, 60.0),)),
+        "tap of 100 N before": Scene(before=2.0, taps=((-1.2, 0.006, 100.0),)),
+        "tap of 150 N before": Scene(before=2.0, taps=((-1.2, 0.010, 150.0),)),
+        "taps of 150 N": Scene(before=2.5, after=2.5, taps=four),
+        "tap of 60 N 30 ms before": Scene(before=1.0, taps=((-0.030, 0.005, 60.0),)),
+        "tap of 100 N 100 ms after": Scene(before=1.0, taps=((0.12, 0.005, 100.0),)),
+        "heel of 300 N after": Scene(before=1.0, after=3.0, taps=((2.0, 0.03, 300.0),)),
+        "ten bumps of 40 to 200 N before": Scene(before=4.0, taps=handled),
+        "steps with heels on the plate before": Scene(before=4.0, treads=walk, taps=heels),
+        "tap of 300 N before": Scene(before=2.0, taps=((-1.2, 0.012, 300.0),)),
+        "ball caught": Scene(before=0.5, after=2.0, loads=caught),
+    }
+    for name, scene in scenes.items():
+        add("footsteps", name, told=False, chain=Chain(10e3), scene=scene)
+    for before in (0.002, 0.005, 0.01, 0.02, 0.05):
+        # Part of the 2 ms may be a soft begin of the pulse.
+        few, name = before < 0.003, f"{1e3 * before:g} ms before"
+        add("pre-trigger", name, scene=Scene(before=before), refusable=few)
+    for after in (0.005, 0.01, 0.02, 0.1):
+        add("pre-trigger", f"{1e3 * after:g} ms after", scene=Scene(after=after, bounces=0))
+    for chain in (Chain(hum=(50.0, 5.0)), Chain(drift=20.0), Chain(noises=((3.0, 1.0),))):
+        sizes = chain.hum[1], chain.drift, chain.noises[0][0]
+        name = "10 and 20 ms, hum {:g} N, {:g} N/s, noise {:g} N".format(*sizes)
+        add("pre-trigger", name, chain=chain, scene=Scene(0.01, 0.02, 0))
+    for count, after in ((0, 0.3), (1, 0.002), (1, -0.008), (2, 0.2), (3, 0.1)):
+        name = f"{count} bounces, {1e3 * after:g} ms after"
+        add("bounces", name, scene=Scene(after=after, bounces=count))
+    balls = [{"restitution": restitution} for restitution in (0.6, 0.72, 0.88)]
+    balls += [{"deformation": deformation} for deformation in (0.0, 0.003)]
+    for ball in [*balls, {"height": 0.7}]:
+        add("bounces", str(ball), ball=ball)
+    for missing in ("height", "mass"):
+        add("bounces", f"{missing} unknown", config={missing: None}, scene=Scene(bounces=2))
+
+
+def _files(add: Callable[..., None]) -> None:
+    """Add copies of files, and load cells in channels."""
+    for files in ("twice", "five times", "overlapping", "saved again", "shifted"):
+        add("duplicates", files, told=False, files=files, chain=Chain(25e3))
+    for files in ("two drops", "five drops"):
+        add("duplicates", files, files=files, chain=Chain(25e3))
+    equal, cells, one = Cells((0.004,) * 4), Cells(), "250 N/V"
+    listed = [f"{1 / s!r} N/V" for s in cells.sensitivities]
+    stated: tuple[tuple[str, bool, Cells, dict[str, Any]], ...] = (
+        ("sum, one calibration", True, equal, {"channels": "sum", "calibration": one}),
+        ("sum, list", True, cells, {"channels": "sum", "calibration": listed}),
+        ("expression", True, cells, {"channels": "F1+F2+F3+F4", "calibration": listed}),
+        ("list of names", True, cells,
+         {"channels": ["F1", "F2", "F3", "F4"], "calibration": listed}),
+        ("not summed", False, equal, {"calibration": one}),
+        ("one of four", False, equal, {"calibration": one, "channel": "F1"}),
+        ("one calibration, unequal", False, cells, {"channels": "sum", "calibration": one}),
+        ("sum of three", False, equal, {"channels": "F1+F2+F3", "calibration": one}),
+    )  # fmt: skip
+    for name, told, some, config in stated:
+        add("channels", name, told=told, chain=Chain(10e3), config=config, cells=some)
+    missing = {"mass": None, "height": None}
+    for files in ("newtons", "sound"):
+        more = {"chain": Chain(10e3), "cells": equal, "files": files}
+        add("channels", f"not summed, {files}", told=False, **more)
+        name = f"not summed, {files}, no mass or height"
+        add("channels", name, told=False, config=missing, **more)
+        add("channels", f"sum, {files}", config={"channels": "sum"}, **more)
+
+
+def _stated(add: Callable[..., None]) -> None:
+    """Add errors of what is stated, and records with many disturbances."""
+    for name, uncertainties in (
+        ("calibration 0.5 %", {"calibration": 0.005}),
+        ("calibration 2 %", {"calibration": 0.02}),
+        ("mass 10 g", {"mass": 0.01}),
+        ("height 5 mm", {"height": 0.005}),
+        ("all", {"calibration": 0.007, "mass": 0.005, "height": 0.003}),
+    ):
+        add("stated errors", name, uncertainties=uncertainties)
+    for key, size in (("calibration", 0.02), ("mass", 0.03), ("height", 0.02)):
+        more = {"config": {f"{key}_uncertainty": None}, "uncertainties": {key: size}}
+        add("stated errors untold", f"{key}, not stated", told=False, **more)
+    rng = np.random.default_rng(271828)
+    for index in range(30):
+        tau = [math.inf, math.inf, 20.0, 5.0, 1.0][rng.integers(5)]
+        plate: dict[str, float] = {} if math.isinf(tau) else {"time_constant": tau}
+        modes: tuple[Mode, ...] = ()
+        rate = float(rng.choice([8e3, 10e3, 16e3, 25e3, 44.1e3, 51.2e3, 96e3]))
+        if rng.random() < 0.4:
+            frequency = float(rng.uniform(1100, min(3000, rate / 5)))
+            modes = (Mode(frequency, float(np.exp(rng.uniform(1.4, 4.0)))),)
+            plate |= {"f0": frequency, "Q": modes[0].quality}
+        chain = Chain(
+            rate, modes, time_constant=tau, bits=int(rng.choice([12, 16, 24])),
+            full_scale=float(rng.choice([5e3, 6e3, 10e3])),
+            noises=((float(np.exp(rng.uniform(-1.5, 1.5))), float(rng.integers(3))), (0.3, 0.0)),
+            offset=rng.uniform(-200, 200), drift=rng.uniform(-10, 10),
+            hum=(float(rng.choice([50.0, 60.0])), float(np.exp(rng.uniform(-2, 2)))),
+            tremor=float(rng.choice([0.0, 0.5])),
+        )  # fmt: skip
+        quiet = (float(np.exp(rng.uniform(-4, end))) for end in (0, -1))
+        scene = Scene(*quiet, int(rng.integers(3)))
+        errors = {"f0": 0.003} if modes else {}
+        if rng.random() < 0.5:
+            errors |= {"calibration": 0.005, "mass": 0.002, "height": 0.003}
+        config = {"plate": plate} if plate else {}
+        add("mixed", f"mixed {index + 1}", chain=chain, scene=scene, config=config,
+            uncertainties=errors)  # fmt: skip
+
+
+def _calibrations(add: Callable[..., None]) -> None:
+    """Add records of a known mass, and taps on the plate."""
+    quiet = Chain(1e4, full_scale=500.0, noises=((0.1, 0.0),))
+    for tau, off in product((math.inf, 30.0, 10.0, 5.0, 2.0), (0.0, 8.0)):
+        chain, name = replace(quiet, time_constant=tau), f"on{' and off' if off else ''}, {tau:g} s"
+        weight = Weight(off=off, end=off + 4 if off else 8.0)
+        add("calibrate", name, told=math.isinf(tau), chain=chain, weight=weight)
+    for name, keys in (
+        ("drift", {"drift": 0.3}),
+        ("hum 5 N", {"hum": (50.0, 5.0)}),
+        ("tremor 1 N", {"tremor": 1.0}),
+    ):
+        add("calibrate", f"on, {name}", chain=replace(quiet, **keys), weight=Weight())
+    droops: dict[str, dict[str, Any]] = {
+        "two of 3 s": {"time_constant": 3.0, "second_time_constant": 3.0},
+        "3 and 20 s": {"time_constant": 3.0, "second_time_constant": 20.0},
+        "5 s, 0.02 N of brown noise": {"noises": ((0.1, 0.0), (0.02, 2.0))},
+        "5 s, drift": {"drift": 0.3},
+        "5 s, laid on in 1 s": {},
+    }
+    for name, keys in droops.items():
+        weight = Weight() if keys else Weight(rise=1.0, knock=60.0)
+        chain = replace(quiet, **({"time_constant": 5.0} | keys))
+        add("calibrate", f"on, {name}", told=False, chain=chain, weight=weight)
+    taps = ((0.0005, 400.0), (0.0008, 300.0), (0.0012, 500.0))
+    for f0, quality in product((1050.0, 1600.0, 2500.0), (5.0, 15.0, 50.0)):
+        # It decays while the hammer touches the plate.
+        brief, name = quality < 4e-3 * f0, f"{f0:g} Hz, Q {quality:g}"
+        add("tap", name, chain=Chain(modes=(Mode(f0, quality),)), taps=taps, refusable=brief)
+    one = Chain(modes=(Mode(1300.0, 20.0),))
+    chains = {
+        "20 kHz": replace(one, rate=20e3),
+        "noise 5 N": replace(one, noises=((5.0, 0.0),)),
+        "hum 5 N": replace(one, hum=(50.0, 5.0)),
+        "pink noise 2 N": replace(one, noises=((2.0, 1.0),)),
+        "second mode": Chain(modes=(Mode(1300.0, 20.0, 0.8), Mode(2300.0, 30.0, 0.2))),
+        "near mode": Chain(modes=(Mode(1300.0, 20.0, 0.7), Mode(1500.0, 30.0, 0.3))),
+    }
+    for name, chain in chains.items():
+        add("tap", name, chain=chain, taps=taps)
+    add("tap", "one tap", chain=one, taps=taps[:1])
+    add("tap", "soft taps", chain=one, taps=((0.003, 200.0),) * 3)
+
+
+_PARTS = (
+    _surroundings, _instruments, _filters, _samples, _scenes, _files, _stated, _calibrations,
+)  # fmt: skip
