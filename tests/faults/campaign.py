@@ -78,7 +78,7 @@ def parts() -> dict[str, Part]:
         "recordings": Part(readers.read_recordings, 4000, 500),
         "tables": Part(readers.read_tables, 800, 60, 20, may_stop=True),
         "studies": Part(readers.read_studies, 300, 60, 20, may_stop=True),
-        "lumped": Part(edges.attempt_lumped, 1500, 60),
+        "lumped": Part(edges.attempt_lumped, 1500, 60, 60, may_stop=True),
         "modal": Part(edges.attempt_modal, 100, 8, 20, may_stop=True),
         "elements": Part(edges.attempt_elements, 40, 4, 15, may_stop=True),
         "explorer": Part(servers.attempt, 60, 8),

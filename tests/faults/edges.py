@@ -33,7 +33,7 @@ STEP_CHANGE = 1e-5
 # Powers of mass, length and time in the units of keys.
 POWERS = {"": (0, 0, 0), "m": (0, 1, 0), "kg": (1, 0, 0), "s": (0, 0, 1), "Hz": (0, 0, -1),
           "Pa": (1, -1, -2), "m/s2": (0, 1, -2), "s/m": (0, -1, 1), "N/m": (1, 0, -2),
-          "N s/m": (1, 0, -1), "m/(N s)": (-1, 0, 1), "m/(N s2)": (-1, 0, 0),
+          "m/s": (0, 1, -1), "N s/m": (1, 0, -1), "m/(N s)": (-1, 0, 1), "m/(N s2)": (-1, 0, 0),
           "kg/m3": (1, -3, 0)}  # fmt: skip
 SCALED_FLOORS = (None, "infinite_plate", "oscillator", "measured_mobility")
 
