@@ -26,11 +26,6 @@ RATE = 44100
 SETS = 32_768
 STREAMED = int(os.environ.get("THUD_BENCH_STREAMED", "500000"))
 
-# Additions and multiplications of one step in shell_series.f90, a multiply-add counted as two:
-# 100 in compression, where the ball of the paper has no flux term, 151 in restitution; and a new
-# series, 270, every twenty steps.
-FLOPS_PER_STEP = (100 + 151) / 2 + 270 / 20
-
 RADIUS, MASS, P_A, GAMMA = 0.089, 2.5, 101325.0, 1.4
 STIFFNESS = 8 * 1.6e6 * 0.032**2 / (RADIUS * 3)
 
@@ -56,6 +51,38 @@ def best(
     return float(np.median(times))
 
 
+def motion(compiled: Any, where: Any) -> tuple[Any, Any, Any]:  # noqa: ANN401 - of a library
+    """Return elastic force, acceleration and a step of RK4 of the shell, compiled by a library.
+
+    `where(condition, a, b)` is its choice: the momentum flux acts in restitution.
+    """
+
+    def elastic(d: Any) -> Any:  # noqa: ANN401
+        ratio = 1 - d**2 * (3 * RADIUS - d) / (4 * RADIUS**3)
+        return STIFFNESS * d + P_A * (ratio**-GAMMA - 1) * np.pi * d * (2 * RADIUS - d)
+
+    elastic = compiled(elastic)
+
+    def rate(d: Any, v: Any) -> Any:  # noqa: ANN401
+        flux = where(v < 0, MASS / (2 * RADIUS), 0.0) * v * v
+        return (flux - elastic(d)) / (MASS * (1 - d / (2 * RADIUS)))
+
+    rate = compiled(rate)
+
+    def step(d: Any, v: Any) -> Any:  # noqa: ANN401
+        h = 1 / RATE
+        k1 = rate(d, v)
+        v2 = v + h / 2 * k1
+        k2 = rate(d + h / 2 * v, v2)
+        v3 = v + h / 2 * k2
+        k3 = rate(d + h / 2 * v2, v3)
+        v4 = v + h * k3
+        k4 = rate(d + h * v3, v4)
+        return d + h / 6 * (v + 2 * (v2 + v3) + v4), v + h / 6 * (k1 + 2 * (k2 + k3) + k4)
+
+    return elastic, rate, compiled(step)
+
+
 def heyoka_rate(count: int = 2048) -> float | None:
     """Return trajectories per second of heyoka's batch mode, all lanes run to their release."""
     try:
@@ -64,10 +91,8 @@ def heyoka_rate(count: int = 2048) -> float | None:
         return None
     lanes = hy.recommended_simd_size()
     d, v = hy.make_vars("d", "v")
-    ratio = 1 - d**2 * (3 * RADIUS - d) / (4 * RADIUS**3)
-    gas = P_A * (ratio**-GAMMA - 1) * np.pi * d * (2 * RADIUS - d)
-    flux = hy.par[0] * MASS / (2 * RADIUS) * v**2
-    system = [(d, v), (v, (flux - STIFFNESS * d - gas) / (MASS * (1 - d / (2 * RADIUS))))]
+    rate = motion(lambda function: function, lambda *_: hy.par[0] * MASS / (2 * RADIUS))[1]
+    system = [(d, v), (v, rate(d, v))]
 
     def turn(ta: Any, _: int, lane: int) -> bool:  # noqa: ANN401
         ta.pars[0, lane] = 1.0
@@ -103,73 +128,51 @@ def heyoka_rate(count: int = 2048) -> float | None:
     return count / best(run)
 
 
-def numba_rate(count: int = 200) -> float | None:  # noqa: C901 - one competitor, one function
+def zoom_transforms(size: int) -> list[tuple[ZoomFFT, float]]:
+    """Return SciPy's transforms of the octaves for records of a size, and their widths, Hz."""
+    bands = thud.get_bands()
+    return [
+        (ZoomFFT(size, [lower, upper], 64, fs=RATE), upper - lower)
+        for lower, upper in zip(bands.lower, bands.upper, strict=True)
+    ]
+
+
+def numba_rate(count: int = 200) -> float | None:
     """Return complete cases per second of a scalar RK4 by numba with SciPy's ZoomFFT levels."""
     try:
         import numba
     except ImportError:
         return None
+    compiled = numba.njit(fastmath=True)
+    elastic, _, step = motion(compiled, compiled(lambda is_so, a, b: a if is_so else b))
 
-    @numba.njit(fastmath=True)  # type: ignore[untyped-decorator]
-    def elastic(d: float) -> float:
-        ratio = 1 - d**2 * (3 * RADIUS - d) / (4 * RADIUS**3)
-        return STIFFNESS * d + P_A * (ratio**-GAMMA - 1) * np.pi * d * (2 * RADIUS - d)
-
-    @numba.njit(fastmath=True)  # type: ignore[untyped-decorator]
-    def rate(d: float, v: float) -> float:
-        flux = MASS / (2 * RADIUS) * v * v if v < 0 else 0.0
-        return (flux - elastic(d)) / (MASS * (1 - d / (2 * RADIUS)))
-
-    @numba.njit(fastmath=True)  # type: ignore[untyped-decorator]
+    @compiled  # type: ignore[untyped-decorator]
     def drop(height: float, force: np.ndarray) -> int:
-        d, v, h = 0.0, np.sqrt(19.62 * height), 1 / RATE
+        d, v = 0.0, np.sqrt(19.62 * height)
         for i in range(len(force)):
             force[i] = elastic(d)
-            k1 = rate(d, v)
-            v2 = v + h / 2 * k1
-            k2 = rate(d + h / 2 * v, v2)
-            v3 = v + h / 2 * k2
-            k3 = rate(d + h / 2 * v2, v3)
-            v4 = v + h * k3
-            k4 = rate(d + h * v3, v4)
-            d += h / 6 * (v + 2 * v2 + 2 * v3 + v4)
-            v += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+            d, v = step(d, v)
             if d <= 0:
                 return i + 1
         return len(force)
 
-    bands = thud.get_bands()
-    edges = list(zip(bands.lower, bands.upper, strict=True))
-    transforms = [ZoomFFT(1102, [lower, upper], 64, fs=RATE) for lower, upper in edges]
-    force = np.zeros(1102)
+    transforms, force = zoom_transforms(1102), np.zeros(1102)
 
     def run() -> None:
         for height in heights(count):
             force[:] = 0
             drop(height, force)
-            for transform, (lower, upper) in zip(transforms, edges, strict=True):
-                np.mean(np.abs(transform(force)) ** 2) * (upper - lower)
+            for transform, width in transforms:
+                np.mean(np.abs(transform(force)) ** 2) * width
 
-    def bare() -> None:
-        for height in heights(count):
-            drop(height, force)
-
-    print(f"  (numba's trajectories alone: {count / best(bare):,.0f}/s)")
     return count / best(run)
 
 
 def zoom_rate(count: int = 200) -> float:
     """Return records per second whose five levels SciPy's ZoomFFT computes, 64 lines per band."""
-    bands = thud.get_bands()
-    edges = list(zip(bands.lower, bands.upper, strict=True))
-    transforms = [ZoomFFT(905, [lower, upper], 64, fs=RATE) for lower, upper in edges]
     records = np.random.default_rng(1).normal(size=(count, 905))
-
-    def run() -> None:
-        for transform in transforms:
-            np.abs(transform(records)) ** 2
-
-    return count / best(run)
+    transforms = zoom_transforms(905)
+    return count / best(lambda: [np.abs(transform(records)) ** 2 for transform, _ in transforms])
 
 
 def jax_rate(count: int = 4096) -> float | None:
@@ -180,38 +183,15 @@ def jax_rate(count: int = 4096) -> float | None:
     except ImportError:
         return None
     jax.config.update("jax_enable_x64", True)  # noqa: FBT003 - JAX's own way
-
-    def rate(d: Any, v: Any) -> Any:  # noqa: ANN401
-        ratio = 1 - d**2 * (3 * RADIUS - d) / (4 * RADIUS**3)
-        gas = P_A * (ratio**-GAMMA - 1) * jnp.pi * d * (2 * RADIUS - d)
-        flux = jnp.where(v < 0, MASS / (2 * RADIUS) * v**2, 0.0)
-        return (flux - STIFFNESS * d - gas) / (MASS * (1 - d / (2 * RADIUS)))
-
-    def step(state: Any, _: None) -> Any:  # noqa: ANN401
-        d, v = state
-        h = 1 / RATE
-        k1 = rate(d, v)
-        v2 = v + h / 2 * k1
-        k2 = rate(d + h / 2 * v, v2)
-        v3 = v + h / 2 * k2
-        k3 = rate(d + h / 2 * v2, v3)
-        v4 = v + h * k3
-        k4 = rate(d + h * v3, v4)
-        new = (d + h / 6 * (v + 2 * (v2 + v3) + v4), v + h / 6 * (k1 + 2 * (k2 + k3) + k4))
-        return new, new[0]
+    step = motion(lambda function: function, jnp.where)[2]
 
     @jax.jit
     def march(v: Any) -> Any:  # noqa: ANN401
-        return jax.lax.scan(step, (jnp.zeros_like(v), v), None, length=905)[1]
+        start = jnp.zeros_like(v), v
+        return jax.lax.scan(lambda state, _: (step(*state),) * 2, start, None, length=905)[1][0]
 
     speed = jnp.sqrt(19.62 * heights(count))
     return count / best(lambda: march(speed).block_until_ready())
-
-
-def dgemm_rate() -> float:
-    """Return the machine's rate in products of matrices, flops per second."""
-    a = np.random.default_rng(1).normal(size=(1024, 1024))
-    return 2 * 1024**3 / best(lambda: a @ a)
 
 
 def stream(count: int, path: Path, chunk: int = 50_000) -> None:
@@ -283,10 +263,6 @@ def bench_ensemble(scipy_drop: Callable[[], object]) -> None:
     report(name, levels, "SciPy ZoomFFT, 64 lines per band", zoom_rate())
     one, two = (SETS / run(threads, clock=time.perf_counter) for threads in (1, 2))
     report("ensemble, two threads", two, "one thread", one)
-    steps = float(np.sum(solve_shells(drops, levels=False).contact_time)) * RATE
-    flops, limit = FLOPS_PER_STEP * steps / bare, dgemm_rate()
-    print(f"trajectories: {FLOPS_PER_STEP:.0f} flops per step, {flops / 1e9:.1f} Gflop/s, "
-          f"{100 * flops / limit:.0f} % of DGEMM's {limit / 1e9:.1f} Gflop/s")  # fmt: skip
     with tempfile.TemporaryDirectory() as directory:
         command = [sys.executable, __file__, "stream", str(STREAMED), f"{directory}/sets"]
         done = subprocess.run(command, check=True, capture_output=True, text=True)

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import os
-import re
-import shutil
 import subprocess
+import sysconfig
 import tempfile
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import competitor_impact
+import calculix
 import numpy as np
-from ensemble import best, dgemm_rate
+from ensemble import best
 from requirements import assess
 
 import thud
@@ -23,12 +22,8 @@ if TYPE_CHECKING:
 
 # What CalculiX computes of the impact, ms: all of it takes more than a minute.
 PART = 4.0
-# With its symbols, which the installed executable lacks.
-EXECUTABLE = Path(__file__).parents[2] / "build/src/thud"
+EXECUTABLE = Path(sysconfig.get_path("scripts")) / "thud"
 FLAGSHIP = thud.Ball(youngs_modulus=2.08e6)
-# Additions and multiplications of an element in a step with five branches and a viscosity: at each
-# of its four Gauss points 98 for a branch and 249 for the rest; 114 for differences between nodes.
-FLOPS_PER_ELEMENT = 4 * (5 * 98 + 249) + 114
 
 
 def bench_modes() -> None:
@@ -41,7 +36,7 @@ def bench_modes() -> None:
 
 
 def bench_impact(row: Callable[..., None]) -> None:
-    """Print the rows on the transient impact, and what limits it."""
+    """Print the rows on the transient impact."""
 
     def flagship() -> thud.Impact:
         return thud.solve(FLAGSHIP, model="finite_element", snapshot_interval=0)
@@ -55,23 +50,17 @@ def bench_impact(row: Callable[..., None]) -> None:
         f"{1e9 * seconds / 512 / steps:.0f} ns for an element and a step"
         f"   {assess('flagship', ms=1e3 * seconds)}"
     )
-    # The checks of the stable step, some 2 % of the time, are not counted as work.
-    rate, limit = FLOPS_PER_ELEMENT * 512 * steps / seconds, dgemm_rate()
-    print(
-        f"{FLOPS_PER_ELEMENT} flops for an element and a step, {rate / 1e9:.1f} Gflop/s, "
-        f"{100 * rate / limit:.0f} % of DGEMM's {limit / 1e9:.1f} Gflop/s"
-    )
     _bench_floor()
     try:
         with tempfile.TemporaryDirectory() as directory:
             begin = time.perf_counter()
-            reference = competitor_impact.calculix_impact(Path(directory), duration=1e-3 * PART)
+            reference = calculix.calculix_impact(Path(directory), duration=1e-3 * PART)
             theirs = time.perf_counter() - begin
-    except competitor_impact.CompetitorMissingError:
+    except calculix.CompetitorMissingError:
         print("CalculiX is not installed: skipped")
     else:
         impulse = np.trapezoid(reference.force, reference.time)
-        elastic = competitor_impact.elastic_impact()
+        elastic = calculix.elastic_impact()
         begun = elastic.time < elastic.touch_time + 1e-3 * PART
         ours = elastic.floor_force[begun].sum() / elastic.sample_rate
         print(
@@ -79,14 +68,13 @@ def bench_impact(row: Callable[..., None]) -> None:
             f"CalculiX {impulse:.3f} N s"
         )
         # All for one element and one millisecond.
-        calculix = theirs / 320 / PART
+        implicit = theirs / 320 / PART
         motion_elastic = 1e3 * elastic.model_quantities["simulated_time"]
-        each = best(competitor_impact.elastic_impact) / 512
+        each = best(calculix.elastic_impact) / 512
         name = "CalculiX, elastic, 0.1 ms implicit"
-        row("impact, elastic, an element and a ms", name, [each / motion_elastic, calculix])
+        row("impact, elastic, an element and a ms", name, [each / motion_elastic, implicit])
         # CalculiX has no viscoelasticity at large strain.
-        row("impact, an element and a ms", name, [seconds / 512 / motion, calculix])
-    _profile()
+        row("impact, an element and a ms", name, [seconds / 512 / motion, implicit])
 
 
 def _bench_floor() -> None:
@@ -109,29 +97,3 @@ def _bench_floor() -> None:
         f"Blocked and on a plate, whole process: {both:.3f} s, {both / blocked:.2f} times the "
         "blocked drop (required: 1.3 times, on two idle cores)"
     )
-
-
-def _profile() -> None:
-    """Print which procedures the time of the flagship goes to."""
-    perf = shutil.which("perf")
-    if not perf or not EXECUTABLE.exists():
-        print("perf or the build directory is missing: no profile")
-        return
-    with tempfile.TemporaryDirectory() as directory:
-        case = Path(directory) / "case.nml"
-        thud.write_case(
-            thud.Case(ball=FLAGSHIP, model=thud.FiniteElement(snapshot_interval=0)), case
-        )
-        record = [perf, "record", "-q", "-o", f"{directory}/data", EXECUTABLE, case, "-q"]
-        found = subprocess.run(
-            [*record, "-o", f"{directory}/out"], check=False, capture_output=True
-        )
-        if found.returncode:
-            print("perf may not count here: no profile")
-            return
-        report = subprocess.run(
-            [perf, "report", "-i", f"{directory}/data", "--stdio", "--sort=symbol"],
-            check=True, capture_output=True, text=True,
-        )  # fmt: skip
-    shares = re.findall(r"([\d.]+)% .*__thud_(\w+)_MOD_(\w+)", report.stdout)
-    print("Its time goes to", ", ".join(f"{name} {share} %" for share, _, name in shares[:6]))

@@ -19,21 +19,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
-from ensemble import bench_ensemble
+from ensemble import RATE, bench_ensemble, motion, zoom_transforms
 from finite_elements import bench_impact, bench_modes
-from requirements import Load, assess, conclude
+from requirements import assess, conclude
 from room_predictions import bench_rooms
 from scipy.integrate import solve_ivp
-from scipy.signal import ZoomFFT
 
 import thud
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from scipy.signal import ZoomFFT
+
 INPUT = Path(__file__).parents[2] / "inputs/rubber_ball_100cm.nml"
 EXECUTABLE = Path(sysconfig.get_path("scripts")) / "thud"
-RATE = 44100
 
 
 def medians(ours: Callable[[], object], theirs: Callable[[], object], runs: int) -> list[float]:
@@ -50,17 +50,10 @@ def medians(ours: Callable[[], object], theirs: Callable[[], object], runs: int)
 
 def scipy_drop() -> tuple[np.ndarray, float]:
     """Return the elastic force of the standard drop, sampled, and the contact time, by SciPy."""
-    radius, mass, p_a = 0.089, 2.5, 101325.0
-    k = 8 * 1.6e6 * 0.032**2 / (radius * 3)
-
-    def elastic(d: np.ndarray) -> np.ndarray:
-        ratio = 1 - d**2 * (3 * radius - d) / (4 * radius**3)
-        return k * d + p_a * (ratio**-1.4 - 1) * np.pi * d * (2 * radius - d)
+    elastic, acceleration, _ = motion(lambda function: function, np.where)
 
     def right_hand_side(_: float, y: np.ndarray) -> tuple[float, float]:
-        d, v = y
-        flux = mass / (2 * radius) * v**2 if v < 0 else 0.0
-        return v, (flux - elastic(d)) / (mass * (1 - d / (2 * radius)))
+        return y[1], acceleration(*y)
 
     def release(_: float, y: np.ndarray) -> float:
         return float(y[0])
@@ -82,14 +75,10 @@ def numpy_levels(force: np.ndarray) -> np.ndarray:
     return np.array([10 * np.log10(2 * power[a:b].sum()) for a, b in edges])
 
 
-def zoom_levels(force: np.ndarray, transforms: list[ZoomFFT]) -> np.ndarray:
+def zoom_levels(force: np.ndarray, transforms: list[tuple[ZoomFFT, float]]) -> np.ndarray:
     """Return the octave levels of a record with SciPy's ZoomFFT, 64 lines per band."""
-    bands = thud.get_bands()
-    energy = [
-        2 * np.mean(np.abs(transform(force)) ** 2) / RATE**2 * (upper - lower)
-        for transform, lower, upper in zip(transforms, bands.lower, bands.upper, strict=True)
-    ]
-    return 10 * np.log10(energy)
+    means = [width * np.mean(np.abs(transform(force)) ** 2) for transform, width in transforms]
+    return 10 * np.log10(2 * np.array(means) / RATE**2)
 
 
 def row(name: str, competitor: str, seconds: list[float]) -> None:
@@ -113,7 +102,6 @@ def processor() -> str:
 
 def main() -> int:
     """Run all benchmarks; return 1 if a requirement was missed on an idle machine."""
-    load = Load()
     print(f"thud {thud.__version__}, NumPy {np.__version__}, SciPy {scipy.__version__}")
     print(f"Processor {processor()}, one thread, medians\n")
 
@@ -140,11 +128,7 @@ def main() -> int:
     row("thud.solve", "SciPy solve_ivp, DOP853", medians(thud.solve, scipy_drop, 51))
     modal = medians(lambda: thud.solve(model="modal_ball"), scipy_drop, 21)
     row("thud.solve, modal ball", "SciPy DOP853, shell model", modal)
-    bands = thud.get_bands()
-    transforms = [
-        ZoomFFT(len(contact), [lower, upper], 64, fs=RATE)
-        for lower, upper in zip(bands.lower, bands.upper, strict=True)
-    ]
+    transforms = zoom_transforms(len(contact))
     exact = medians(
         lambda: thud.force_exposure_levels(contact, RATE), lambda: numpy_levels(contact), 101
     )
@@ -169,7 +153,7 @@ def main() -> int:
     bench_impact(row)
     print()
     bench_rooms(row, medians)
-    return conclude(load)
+    return conclude()
 
 
 sys.exit(main())

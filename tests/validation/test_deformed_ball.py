@@ -150,7 +150,7 @@ def test_undamped_ball_is_that_of_calculix(
     oracle: Callable[..., None], curve: Callable[..., None]
 ) -> None:
     # CalculiX 2.20, 6 x 80 quadratic elements, increment 0.05 ms, penalty 4e9 Pa/m, without gas and
-    # gravity (tests/bench/competitor_impact.py): 22.25 ms, e 0.9805 and these levels. At 250 and
+    # gravity (tests/bench/calculix.py): 22.25 ms, e 0.9805 and these levels. At 250 and
     # 500 Hz 12 x 96 linear elements are 0.4 and 0.5 dB below their limit, and increments of 0.02 ms
     # raise CalculiX by 0.1 dB.
     reference = np.array([37.79, 26.38, 21.24, 20.67, 12.92])

@@ -110,7 +110,7 @@ def test_linear_modes_and_elements_agree_at_small_deflections(oracle: Callable[.
 
 def test_large_compression_is_that_of_calculix(oracle: Callable[..., None]) -> None:
     # CalculiX 2.20, 5 x 32 quadratic elements in half the ball, penalty 1e11 Pa/m, no gas
-    # (tests/bench/competitor_compression.py). Its last tenfold penalty has raised the forces by
+    # (tests/bench/calculix.py). Its last tenfold penalty has raised the forces by
     # 1.8, 1.6, 1.3, 1.0, 0.7, 0.4, 0.2 and 0.05 %: at 5 mm it is still too soft.
     reference = np.array([61.88, 153.00, 256.13, 366.98, 483.67, 604.62, 729.53, 856.59])
     elastic = thud.FiniteElement(viscosity="none")

@@ -1,9 +1,11 @@
-"""Impact of the undamped rubber ball on a rigid floor by CalculiX, for the benchmarks.
+"""The undamped rubber ball by CalculiX: an impact on a rigid floor, and a slow press.
+
+    .venv/bin/python tests/bench/calculix.py    # the press against thud, some minutes
 
 The half cross-section of the ball has 5 x 64 quadratic elements of a nearly incompressible
-neo-Hookean material and falls on a fixed slab. There is neither gravity nor gas. CalculiX has no
-viscoelasticity at large strain: of the default law of thud's finite elements, it has the elastic
-part.
+neo-Hookean material and touches a fixed slab; the press moves the equator of its lower half down by
+half the approach of two plates. There is neither gravity nor gas. CalculiX has no viscoelasticity
+at large strain: of the default law of thud's finite elements, it has the elastic part.
 """
 
 from __future__ import annotations
@@ -14,14 +16,12 @@ import shutil
 import subprocess
 import warnings
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
 import thud
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 RADIUS, WALL, MASS = 0.089, 0.032, 2.5
 MODULUS, POISSON = 1.6e6, 0.49
@@ -34,6 +34,8 @@ WEDGES = 180
 # It gives no initial velocity to the nodes of that wedge; a short gravity launches the ball.
 LAUNCH = 1e-5
 GAP = VELOCITY * LAUNCH / 2
+# Approach of the plates of the press, m, its increments and the penalties of the contact, Pa/m.
+DEFLECTION, INCREMENTS, PENALTIES = 0.04, 80, (1e9, 1e10, 1e11)
 
 
 class CompetitorMissingError(RuntimeError):
@@ -70,9 +72,9 @@ class Impact:
         return float(np.trapezoid(self.force, self.time) / MASS - VELOCITY)
 
 
-def ball_lines() -> list[str]:
-    """Return nodes, elements, sets and the outer face of the ball."""
-    points = [(i, j) for i in range(2 * ALONG + 1) for j in range(2 * THROUGH + 1)]
+def ball_lines(along: int) -> list[str]:
+    """Return nodes, elements, sets and the outer face of the ball, that many elements upwards."""
+    points = [(i, j) for i in range(2 * along + 1) for j in range(2 * THROUGH + 1)]
     numbers = {p: k for k, p in enumerate((p for p in points if p[0] * p[1] % 2 == 0), 1)}
     places = {}
     for (i, j), number in numbers.items():
@@ -81,7 +83,7 @@ def ball_lines() -> list[str]:
         places[number] = across, -radius * np.cos(angle)
     # The eight nodes in steps of angle and radius: counterclockwise, corners first.
     steps = ((0, 0), (0, 2), (2, 2), (2, 0), (0, 1), (1, 2), (2, 1), (1, 0))
-    corners = [(i, j) for i in range(0, 2 * ALONG, 2) for j in range(0, 2 * THROUGH, 2)]
+    corners = [(i, j) for i in range(0, 2 * along, 2) for j in range(0, 2 * THROUGH, 2)]
     elements = [[numbers[i + a, j + b] for a, b in steps] for i, j in corners]
     return [
         "*NODE, NSET=BALL",
@@ -89,8 +91,9 @@ def ball_lines() -> list[str]:
         "*ELEMENT, TYPE=CAX8R, ELSET=BALL",
         *(f"{i}, " + ", ".join(map(str, e)) for i, e in enumerate(elements, 1)),
         "*NSET, NSET=AXIS", *(f"{i}," for i, place in places.items() if place[0] == 0),
+        "*NSET, NSET=EQUATOR", *(f"{i}," for i, (_, y) in places.items() if abs(y) < RADIUS / 1e6),
         "*SURFACE, NAME=OUTSIDE",
-        *(f"{i}, S2" for i in range(THROUGH, len(elements) // 2 + 1, THROUGH)),
+        *(f"{i}, S2" for i in range(THROUGH, THROUGH * ALONG // 2 + 1, THROUGH)),
     ]  # fmt: skip
 
 
@@ -116,49 +119,45 @@ def floor_lines() -> list[str]:
     ]
 
 
-def calculix_deck(increment: float, duration: float, alpha: float, penalty: float) -> str:
-    """Return the input of CalculiX."""
+def run_calculix(directory: Path, along: int, penalty: float, *steps: str) -> str:
+    """Run CalculiX in a directory; return what it prints of the ball, elements upwards, and floor.
+
+    `penalty` is the pressure over the penetration of the floor, Pa/m: a layer of that stiffness.
+    Raise CompetitorMissingError if ccx is not installed.
+    """
+    executable = shutil.which("ccx")
+    if executable is None:
+        message = "ccx is not installed"
+        raise CompetitorMissingError(message)
     shear, bulk = MODULUS / (2 * (1 + POISSON)), MODULUS / (3 * (1 - 2 * POISSON))
-    return "\n".join([
-        *ball_lines(),
-        *floor_lines(),
+    deck = "\n".join([
+        *ball_lines(along), *floor_lines(),
         "*BOUNDARY", "AXIS, 1, 1", "FLOOR, 1, 2",
         "*MATERIAL, NAME=RUBBER",
         "*HYPERELASTIC, NEO HOOKE", f"{shear / 2:.12g}, {2 / bulk:.12g}",
         "*DENSITY", f"{DENSITY:.12g}",
         "*SOLID SECTION, ELSET=BALL, MATERIAL=RUBBER",
-        "*MATERIAL, NAME=STEEL",
-        "*ELASTIC", "2.1e11, 0.3",
-        "*DENSITY", "7850",
+        "*MATERIAL, NAME=STEEL", "*ELASTIC", "2.1e11, 0.3", "*DENSITY", "7850",
         "*SOLID SECTION, ELSET=FLOOR, MATERIAL=STEEL",
         "*SURFACE INTERACTION, NAME=HARD",
         "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", f"{penalty:g}",
         "*CONTACT PAIR, INTERACTION=HARD, TYPE=SURFACE TO SURFACE", "OUTSIDE, TOP",
-        "*STEP, NLGEOM", "*DYNAMIC, DIRECT, ALPHA=0", f"{LAUNCH:g}, {LAUNCH:g}",
-        "*DLOAD", f"BALL, GRAV, {VELOCITY / LAUNCH:.12g}, 0, -1, 0",
-        "*END STEP",
-        f"*STEP, NLGEOM, INC={round(duration / increment) + 1}",
-        f"*DYNAMIC, DIRECT, ALPHA={alpha:g}", f"{increment:g}, {duration:g}",
-        "*DLOAD, OP=NEW",
-        "*NODE PRINT, NSET=FLOOR, TOTALS=ONLY", "RF",
-        "*EL PRINT, ELSET=BALL, TOTALS=ONLY", "ELSE, ELKE",
+        *steps, "*NODE PRINT, NSET=FLOOR, TOTALS=ONLY", "RF",
         "*END STEP", "",
     ])  # fmt: skip
+    (directory / "ball.inp").write_text(deck, encoding="ascii")
+    subprocess.run(
+        [executable, "ball"], cwd=directory, check=False, stdout=subprocess.DEVNULL,
+        env=os.environ | {"OMP_NUM_THREADS": "1"},
+    )  # fmt: skip
+    return (directory / "ball.dat").read_text(encoding="ascii")
 
 
-def read_totals(text: str) -> list[np.ndarray]:
-    """Return time, force, strain and kinetic energy from the .dat file, for the whole ball."""
-    blocks = {
-        name: re.findall(rf"total {name}.* and time +(\S+)\s+(\S+)(?: +(\S+))?", text)
-        for name in ("force", "internal energy", "kinetic energy")
-    }
-    time = np.array([float(block[0]) for block in blocks["force"]]) - LAUNCH
-    force = np.array([float(block[2]) for block in blocks["force"]])
-    strain, kinetic = (
-        np.array([float(block[1]) for block in blocks[f"{name} energy"]])
-        for name in ("internal", "kinetic")
-    )
-    return [time, WEDGES * force, WEDGES * strain, WEDGES * kinetic]
+def read_totals(text: str, name: str, column: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return times, s, and a column of the sums of a quantity, for the whole ball."""
+    blocks = re.findall(rf"total {name}.* and time +(\S+)\s+(\S+)(?: +(\S+))?", text)
+    time, values = (np.array([float(block[k]) for block in blocks]) for k in (0, column))
+    return time, WEDGES * values
 
 
 def calculix_impact(
@@ -179,30 +178,30 @@ def calculix_impact(
     alpha : float
         Numerical damping of the implicit method (Hilber, Hughes and Taylor), from -1/3 to 0.
     penalty : float
-        Pressure over penetration of the floor, in Pa/m: a layer of that stiffness.
+        See `run_calculix`.
 
     Raises
     ------
-    CompetitorMissingError
-        If ccx is not installed.
     RuntimeError
         If ccx stops before the end, which its exit status does not always tell.
     """
-    executable = shutil.which("ccx")
-    if executable is None:
-        message = "ccx is not installed"
-        raise CompetitorMissingError(message)
-    deck = calculix_deck(increment, duration, alpha, penalty)
-    (directory / "impact.inp").write_text(deck, encoding="ascii")
-    subprocess.run(
-        [executable, "impact"], cwd=directory, check=False, stdout=subprocess.DEVNULL,
-        env=os.environ | {"OMP_NUM_THREADS": "1"},
+    count = round(duration / increment) + 1
+    text = run_calculix(
+        directory, ALONG, penalty,
+        "*STEP, NLGEOM", "*DYNAMIC, DIRECT, ALPHA=0", f"{LAUNCH:g}, {LAUNCH:g}",
+        "*DLOAD", f"BALL, GRAV, {VELOCITY / LAUNCH:.12g}, 0, -1, 0",
+        "*END STEP",
+        f"*STEP, NLGEOM, INC={count}",
+        f"*DYNAMIC, DIRECT, ALPHA={alpha:g}", f"{increment:g}, {duration:g}",
+        "*DLOAD, OP=NEW",
+        "*EL PRINT, ELSET=BALL, TOTALS=ONLY", "ELSE, ELKE",
     )  # fmt: skip
-    text = (directory / "impact.dat").read_text(encoding="ascii")
+    time, force = read_totals(text, "force", 2)
+    energies = [read_totals(text, f"{name} energy", 1)[1] for name in ("internal", "kinetic")]
     start = (0.0, 0.0, 0.0, MASS * VELOCITY**2 / 2)
-    columns = zip(start, read_totals(text), strict=True)
+    columns = zip(start, (time - LAUNCH, force, *energies), strict=True)
     result = Impact(*(np.concatenate(([first], column)) for first, column in columns))
-    if len(result.time) != round(duration / increment) + 1:
+    if len(result.time) != count:
         message = f"ccx stopped after {result.time[-1]:.3g} s"
         raise RuntimeError(message)
     return result
@@ -220,3 +219,32 @@ def elastic_impact(penalty: float = 1e9) -> thud.Impact:
             ball, drop, "finite_element", viscosity="none", snapshot_interval=0,
             layer_stiffness=penalty,
         )  # fmt: skip
+
+
+def calculix_press(directory: Path, penalty: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return approach of the plates, m, and force, N."""
+    text = run_calculix(
+        directory, ALONG // 2, penalty,
+        f"*STEP, NLGEOM, INC={INCREMENTS + 1}", "*STATIC, DIRECT", f"{1 / INCREMENTS:.12g}, 1",
+        "*BOUNDARY", f"EQUATOR, 2, 2, {-(DEFLECTION / 2 + GAP):.12g}",
+    )  # fmt: skip
+    time, force = read_totals(text, "force", 2)
+    return 2 * (time * (DEFLECTION / 2 + GAP) - GAP), np.abs(force)
+
+
+def main() -> None:
+    """Print both curves of the press at eight points."""
+    points = DEFLECTION * np.arange(1, 9) / 8
+    ball = thud.Ball(outer_radius=RADIUS, wall_thickness=WALL, poisson_ratio=POISSON)
+    elastic = thud.FiniteElement(viscosity="none")
+    curve = thud.compress(ball, elastic, max_deflection=DEFLECTION, points=9)
+    print("mm      ", *(f"{1e3 * d:8.1f}" for d in points))
+    print("thud, N ", *(f"{f:8.2f}" for f in curve.force[1:]))
+    for penalty in PENALTIES:
+        with TemporaryDirectory() as name:
+            found = calculix_press(Path(name), penalty)
+        print(f"{penalty:8.0e}", *(f"{f:8.2f}" for f in np.interp(points, *found)))
+
+
+if __name__ == "__main__":
+    main()
