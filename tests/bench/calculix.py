@@ -235,7 +235,9 @@ def calculix_press(directory: Path, penalty: float) -> tuple[np.ndarray, np.ndar
 def main() -> None:
     """Print both curves of the press at eight points."""
     points = DEFLECTION * np.arange(1, 9) / 8
-    ball = thud.Ball(outer_radius=RADIUS, wall_thickness=WALL, poisson_ratio=POISSON)
+    ball = thud.Ball(
+        outer_radius=RADIUS, wall_thickness=WALL, youngs_modulus=MODULUS, poisson_ratio=POISSON
+    )
     elastic = thud.FiniteElement(viscosity="none")
     curve = thud.compress(ball, elastic, max_deflection=DEFLECTION, points=9)
     print("mm      ", *(f"{1e3 * d:8.1f}" for d in points))

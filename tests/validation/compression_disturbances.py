@@ -1,25 +1,23 @@
-"""Fits to curves of a press with disturbances: errors, coverage, and misses in silence.
+"""Fits to curves of a press with disturbances: the modulus of the modal ball.
 
     python tests/validation/compression_disturbances.py [CURVES]
 
-fits the modulus of the modal ball to curves of 41 points from first touch to 30 mm, to which noise
-and one disturbance are added. A miss is a modulus that is more than 3 standard errors from the
-truth; it is silent if the fit does not warn.
+Curves have 41 points from first touch to 30 mm, to which noise and one disturbance are added.
 """
 
 from __future__ import annotations
 
 import sys
-import warnings
 from functools import lru_cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
+from fit_tally import print_tallies, quiet_fit
 
 import thud
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from numpy.typing import NDArray
 
@@ -32,8 +30,7 @@ TRUE = thud.Ball(youngs_modulus=1.83e6)
 MODEL = thud.ModalBall(rings=20)
 CASE = thud.Case(ball=thud.Ball(youngs_modulus=3e6), model=MODEL)
 TOUCH = 1.2e-3
-CONFIDENCE = 0.9
-ERRORS = 3.0
+TRUTH = {"youngs_modulus": TRUE.youngs_modulus}
 
 
 def noise(size: float, correlation: float = 0.0) -> Disturbance:
@@ -91,22 +88,7 @@ def curve_of(name: str, seed: int, white: float | None = None) -> tuple[Array, A
 def quiet(curve: tuple[Array, Array], unknowns: Sequence[str] | None = None) -> thud.Fit:
     """Return a fit whose warnings do not matter."""
     options = {} if unknowns is None else {"unknowns": unknowns}
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", thud.FitWarning)
-        target = thud.CompressionTarget(*curve, **options)
-        return thud.fit(target, ["youngs_modulus"], CASE, confidence=CONFIDENCE)
-
-
-class Tally(NamedTuple):
-    """Fits of one disturbance, and of them: covering, missed, warned, silent; relative errors."""
-
-    fits: int
-    covered: int
-    missed: int
-    warned: int
-    silent: int
-    errors: Array
-    widths: Array
+    return quiet_fit(thud.CompressionTarget(*curve, **options), ["youngs_modulus"], CASE)
 
 
 def miss(fit: thud.Fit) -> float:
@@ -115,41 +97,11 @@ def miss(fit: thud.Fit) -> float:
     return abs(error) / fit.standard_errors["youngs_modulus"]
 
 
-def tally(name: str, curves: int, unknowns: Sequence[str] | None = None) -> Tally:
-    """Return what fits to curves with a disturbance give."""
-    fits = [quiet(curve_of(name, seed), unknowns) for seed in range(curves)]
-    ends = [fit.intervals()["youngs_modulus"] for fit in fits]
-    far = [miss(fit) > ERRORS for fit in fits]
-    return Tally(
-        curves,
-        sum(low < TRUE.youngs_modulus < high for low, high in ends),
-        sum(far),
-        sum(bool(fit.warnings) for fit in fits),
-        sum(missed and not fit.warnings for missed, fit in zip(far, fits, strict=True)),
-        np.array([fit.values["youngs_modulus"] / TRUE.youngs_modulus - 1 for fit in fits]),
-        np.array([fit.standard_errors["youngs_modulus"] / TRUE.youngs_modulus for fit in fits]),
-    )
-
-
-def main() -> None:
-    """Print the table of all disturbances, with and without unknowns."""
-    curves = int(sys.argv[1]) if len(sys.argv) > 1 else 40
-    sys.stdout.write(
-        f"{curves} curves each; of E, %\n"
-        "| disturbance | unknowns | covered | warned | silent misses | mean error | scatter | "
-        "standard error |\n|---|---|---|---|---|---|---|---|\n"
-    )
-    for name in DISTURBANCES:
-        for unknowns in (None, ()):
-            found = tally(name, curves, unknowns)
-            numbers = 100 * np.array([found.errors.mean(), found.errors.std(), found.widths.mean()])
-            cells = [
-                name, "all" if unknowns is None else "none", str(found.covered),
-                str(found.warned), str(found.silent), *(f"{number:.2g}" for number in numbers),
-            ]  # fmt: skip
-            sys.stdout.write(f"| {' | '.join(cells)} |\n")
-            sys.stdout.flush()
+def fits(name: str, count: int, unknowns: Sequence[str] | None = None) -> Iterator[thud.Fit]:
+    """Yield fits to curves with a disturbance."""
+    return (quiet(curve_of(name, seed), unknowns) for seed in range(count))
 
 
 if __name__ == "__main__":
-    main()
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else 40
+    print_tallies(DISTURBANCES, fits, TRUTH, count)

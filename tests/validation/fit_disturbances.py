@@ -1,26 +1,24 @@
-"""Coverage of the intervals of fits to disturbed records, and how many fits warn.
+"""Fits to disturbed records: modulus and height of the shell.
 
-    python tests/validation/fit_disturbances.py [SEEDS] [QUIET]
+    python tests/validation/fit_disturbances.py [SEEDS]
 
-fits modulus and height of the shell model to records of 200 seeds, each with 40 ms of zeros before
-and after the pulse, to which noise and one disturbance are added, and prints for each disturbance
-how many of the 90 % intervals hold the truth. No fit may be wrong in silence: intervals cover as
-often as they say, within binomial bounds, in all fits or in those that do not warn.
+Each record has 40 ms of zeros before and after the pulse, to which noise and one disturbance are
+added. No fit may be wrong in silence: the 90 % intervals cover as often as they say, within
+binomial bounds, in all fits or in those that do not warn.
 """
 
 from __future__ import annotations
 
 import sys
-import warnings
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy import stats
+from fit_tally import print_tallies, quiet_fit
 
 import thud
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from numpy.typing import NDArray
 
@@ -29,10 +27,7 @@ if TYPE_CHECKING:
 RATE = 44100.0
 QUIET = 0.04
 NOISE = 5.0
-CONFIDENCE = 0.9
 TRUTH = {"youngs_modulus": 1.8e6, "height": 1.1}
-# A count outside of bounds that hold for all numbers of a table has this probability.
-SURPRISE = 1e-3
 
 
 def coloured(power: float, size: float = NOISE, low: float = 1.0) -> Disturbance:
@@ -124,26 +119,6 @@ DISTURBANCES: dict[str, Disturbance] = {
 }
 
 
-class Tally(NamedTuple):
-    """Of one disturbance: fits, those without a warning, and intervals that hold the truth."""
-
-    fits: int
-    silent: int
-    covered: dict[str, int]
-    covered_silent: dict[str, int]
-
-    @property
-    def honest(self) -> bool:
-        """Whether the intervals cover, in all fits or in those without a warning."""
-        return _covers(self.covered, self.fits) or _covers(self.covered_silent, self.silent)
-
-
-def _covers(covered: dict[str, int], count: int) -> bool:
-    """Return whether no fewer intervals hold the truth than chance explains."""
-    least = stats.binom.ppf(SURPRISE, count, CONFIDENCE)
-    return all(number >= least for number in covered.values())
-
-
 def pulse(quiet: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return time, s, and force, N, of the truth with quiet on both sides."""
     ball = thud.Ball(youngs_modulus=TRUTH["youngs_modulus"])
@@ -154,52 +129,15 @@ def pulse(quiet: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     return np.arange(len(force)) / RATE, force
 
 
-def tally(name: str, seeds: int, quiet: float = QUIET) -> Tally:
-    """Return what fits to records of a disturbance find."""
-    time, force = pulse(quiet)
-    covered, silent = dict.fromkeys(TRUTH, 0), dict.fromkeys(TRUTH, 0)
-    quiet_fits = 0
+def fits(name: str, count: int, **options: Any) -> Iterator[thud.Fit]:  # noqa: ANN401 - of `fit`
+    """Yield fits to records of a disturbance."""
+    time, force = pulse(QUIET)
     case = thud.Case(sampling=thud.Sampling(duration=0.026), model=thud.HollowSphere())
-    for seed in range(seeds):
+    for seed in range(count):
         random = np.random.default_rng([seed, *name.encode()])
         record = time, force + DISTURBANCES[name](time, random)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", thud.FitWarning)
-            found = thud.fit(record, TRUTH, case, confidence=CONFIDENCE)
-        quiet_fits += not found.warnings
-        for key, (low, high) in found.intervals().items():
-            if key in TRUTH:
-                hit = low < TRUTH[key] < high
-                covered[key] += hit
-                silent[key] += hit and not found.warnings
-    return Tally(seeds, quiet_fits, covered, silent)
-
-
-def main() -> None:
-    """Print the table of all disturbances."""
-    seeds = int(sys.argv[1]) if len(sys.argv) > 1 else 200
-    quiet = float(sys.argv[2]) if len(sys.argv) > 2 else QUIET
-    lines = [
-        f"{seeds} seeds, {1e3 * quiet:g} ms of quiet on each side",
-        "| disturbance | E | height | fits that warn | of the others, E | height | |",
-        "|---|---|---|---|---|---|---|",
-    ]
-    sys.stdout.write("\n".join(lines) + "\n")
-    for name in DISTURBANCES:
-        found = tally(name, seeds, quiet)
-        shares = [
-            f"{number / count:.2f}" if count else ""
-            for numbers, count in (
-                (found.covered, found.fits),
-                (found.covered_silent, found.silent),
-            )
-            for number in numbers.values()
-        ]
-        honest = "" if found.honest else "wrong in silence"
-        cells = [name, *shares[:2], str(found.fits - found.silent), *shares[2:], honest]
-        sys.stdout.write(f"| {' | '.join(cells)} |\n")
-        sys.stdout.flush()
+        yield quiet_fit(record, TRUTH, case, **options)
 
 
 if __name__ == "__main__":
-    main()
+    print_tallies(DISTURBANCES, fits, TRUTH, int(sys.argv[1]) if len(sys.argv) > 1 else 200)
