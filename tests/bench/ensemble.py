@@ -51,10 +51,10 @@ def best(
     return float(np.median(times))
 
 
-def motion(compiled: Any, where: Any) -> tuple[Any, Any, Any]:  # noqa: ANN401 - of a library
+def motion(compiled: Any, in_restitution: Any) -> tuple[Any, Any, Any]:  # noqa: ANN401 - of a library
     """Return elastic force, acceleration and a step of RK4 of the shell, compiled by a library.
 
-    `where(condition, a, b)` is its choice: the momentum flux acts in restitution.
+    `in_restitution(v, value)` is its choice of the value where v < 0, of zero elsewhere.
     """
 
     def elastic(d: Any) -> Any:  # noqa: ANN401
@@ -64,7 +64,7 @@ def motion(compiled: Any, where: Any) -> tuple[Any, Any, Any]:  # noqa: ANN401 -
     elastic = compiled(elastic)
 
     def rate(d: Any, v: Any) -> Any:  # noqa: ANN401
-        flux = where(v < 0, MASS / (2 * RADIUS), 0.0) * v * v
+        flux = in_restitution(v, MASS / (2 * RADIUS)) * v * v
         return (flux - elastic(d)) / (MASS * (1 - d / (2 * RADIUS)))
 
     rate = compiled(rate)
@@ -144,7 +144,7 @@ def numba_rate(count: int = 200) -> float | None:
     except ImportError:
         return None
     compiled = numba.njit(fastmath=True)
-    elastic, _, step = motion(compiled, compiled(lambda is_so, a, b: a if is_so else b))
+    elastic, _, step = motion(compiled, compiled(lambda v, value: value if v < 0 else 0.0))
 
     @compiled  # type: ignore[untyped-decorator]
     def drop(height: float, force: np.ndarray) -> int:
@@ -183,7 +183,7 @@ def jax_rate(count: int = 4096) -> float | None:
     except ImportError:
         return None
     jax.config.update("jax_enable_x64", True)  # noqa: FBT003 - JAX's own way
-    step = motion(lambda function: function, jnp.where)[2]
+    step = motion(lambda function: function, lambda v, value: jnp.where(v < 0, value, 0.0))[2]
 
     @jax.jit
     def march(v: Any) -> Any:  # noqa: ANN401

@@ -50,7 +50,9 @@ def medians(ours: Callable[[], object], theirs: Callable[[], object], runs: int)
 
 def scipy_drop() -> tuple[np.ndarray, float]:
     """Return the elastic force of the standard drop, sampled, and the contact time, by SciPy."""
-    elastic, acceleration, _ = motion(lambda function: function, np.where)
+    elastic, acceleration, _ = motion(
+        lambda function: function, lambda v, value: value if v < 0 else 0.0
+    )
 
     def right_hand_side(_: float, y: np.ndarray) -> tuple[float, float]:
         return y[1], acceleration(*y)
