@@ -61,12 +61,9 @@ def first_picture(browser: Browser, address: str) -> float:
     page = browser.new_context(viewport={"width": 1400, "height": 900}).new_page()
     connection = page.context.new_cdp_session(page)
     connection.send("Network.enable")
-    conditions = {
-        "latency": LATENCY,
-        "downloadThroughput": THROUGHPUT,
-        "uploadThroughput": THROUGHPUT,
-    }
-    connection.send("Network.emulateNetworkConditions", {"offline": False, **conditions})
+    speeds = {"downloadThroughput": THROUGHPUT, "uploadThroughput": THROUGHPUT}
+    conditions = {"offline": False, "latency": LATENCY} | speeds
+    connection.send("Network.emulateNetworkConditions", conditions)
     page.add_init_script(WATCH)
     page.goto(address)
     page.wait_for_timeout(3000)

@@ -26,6 +26,7 @@ import traceback
 import warnings
 from collections import Counter
 from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -118,7 +119,10 @@ def work(name: str, part: Part, seeds: list[int]) -> None:
     # Whatever else is printed goes to the same file as errors, which must not grow.
     os.dup2(2, 1)
     warnings.simplefilter("ignore")
-    if not SANITIZED:
+    if SANITIZED:
+        core = import_module("thud._core").__file__ or ""
+        assert b"__asan_init" in Path(core).read_bytes(), f"{core} has no sanitizer"
+    else:
         resource.setrlimit(resource.RLIMIT_AS, (SPACE, SPACE))
     for folder in ("here", "temporary"):
         Path(folder).mkdir()
