@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import struct
 import warnings
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import h5py
@@ -15,19 +16,19 @@ import scipy.io
 import soundfile
 
 from thud.recordings.config import Config
-from thud.recordings.signal import open_signals
+from thud.recordings.signal import Signal, open_signals
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
-    from numpy.typing import NDArray
-
-    from thud.recordings.signal import Signal
+    from numpy.typing import ArrayLike, NDArray
 
     Writer = Callable[[Path, NDArray[np.float64], float, str], None]
+    # The owner of an entry of a header is the array, its group or the file.
+    Entry = tuple[str, str, Any]
+    HeaderWriter = Callable[[Path, NDArray[np.float64], list[Entry]], None]
 
-PEAK, DURATION = 1500.0, 0.02
+PEAK, DURATION, RATE = 1500.0, 0.02, 8000.0
 
 
 def opened(path: Path | str, **stated: Any) -> list[Signal]:  # noqa: ANN401 - of `Config`
@@ -40,6 +41,26 @@ def half_sine(rate: float, before: float = 0.01, after: float = 0.01) -> NDArray
     time = np.arange(round((before + DURATION + after) * rate)) / rate - before
     inside = (time > 0) & (time < DURATION)
     return np.where(inside, PEAK * np.sin(np.pi * time / DURATION), 0.0)
+
+
+FORCE = half_sine(RATE)
+
+
+def noisy(level: ArrayLike, deviation: float, seed: int = 1) -> NDArray[np.float64]:
+    """Return a level with white noise of a standard deviation."""
+    return level + np.random.default_rng(seed).normal(0, deviation, np.shape(level))
+
+
+def steps(*plateaus: tuple[float, int]) -> Signal:
+    """Return a record of levels, V, and their numbers of samples."""
+    levels, counts = zip(*plateaus, strict=True)
+    return Signal.from_array(np.repeat(levels, counts), 5000.0)
+
+
+def rows_of(row: str | Callable[[int, float, float], str]) -> str:
+    """Return the rows of a table from their index, time, s, and force, N, of the half sine."""
+    form = (lambda i, t, f: row.format(i=i, t=t, f=f)) if isinstance(row, str) else row
+    return "".join(form(i, i / RATE, force) + "\n" for i, force in enumerate(FORCE))
 
 
 def _sound(kind: str, container: str | None = None) -> Writer:
@@ -67,11 +88,12 @@ def _table(head: str, separator: str, *, comma: bool = False, time: bool = True)
     return write
 
 
-def _hdf5(path: Path, values: NDArray[np.float64], rate: float, unit: str) -> None:
+def write_hdf5(path: Path, values: NDArray[np.float64], entries: list[Entry]) -> None:
     with h5py.File(path, "w") as file:
         data = file.create_dataset("plate/force", data=values, chunks=(64,), compression="gzip")
-        data.attrs["units"], data.attrs["sample_rate"] = unit, rate
-        file.attrs["date"] = "2024-05-06"
+        for owner, key, value in entries:
+            target = {"array": data, "group": file["plate"], "file": file}[owner]
+            (target if owner != "array" and len(key) % 2 else target.attrs)[key] = value
 
 
 def _netcdf(path: Path, values: NDArray[np.float64], rate: float, unit: str) -> None:
@@ -84,23 +106,33 @@ def _netcdf(path: Path, values: NDArray[np.float64], rate: float, unit: str) -> 
         file["force"].attrs["units"] = unit
 
 
-def _universal(binary: int) -> Writer:
-    def write(path: Path, values: NDArray[np.float64], rate: float, unit: str) -> None:
-        path.unlink(missing_ok=True)
-        entry = {
-            "type": 58, "binary": binary, "func_type": 1, "data": values, "id1": "force plate",
-            "id3": "06-MAY-24 10:00:00", "x": np.arange(len(values)) / rate, "rsp_node": 1,
-            "rsp_dir": 3, "ref_node": 1, "ref_dir": 3, "abscissa_spacing": 1,
-            "abscissa_inc": 1 / rate, "abscissa_spec_data_type": 17, "ordinate_spec_data_type": 13,
-            "orddenom_spec_data_type": 0, "z_axis_spec_data_type": 0,
-            "abscissa_axis_units_lab": "s", "ordinate_axis_units_lab": unit,
-        }  # fmt: skip
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ResourceWarning)  # the writer leaves a file open
+def write_universal(path: Path, *sets: dict[str, Any]) -> None:
+    path.unlink(missing_ok=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ResourceWarning)  # the writer leaves a file open
+        gc.disable()  # it stays among the youngest objects
+        for entry in sets:
             pyuff.UFF(str(path)).write_sets([entry], "add")
-            gc.collect()
+        gc.collect(0)
+        gc.enable()
 
-    return write
+
+def universal_record(
+    values: NDArray[np.float64], rate: float, unit: str, binary: int, quantity: int = 13
+) -> dict[str, Any]:
+    """Return a data set 58 of samples, whose quantity is a force by default."""
+    return {
+        "type": 58, "binary": binary, "func_type": 1, "data": values, "id1": "force plate",
+        "id3": "06-MAY-24 10:00:00", "x": np.arange(len(values)) / rate, "rsp_node": 1,
+        "rsp_dir": 3, "ref_node": 1, "ref_dir": 3, "abscissa_spacing": 1,
+        "abscissa_inc": 1 / rate, "abscissa_spec_data_type": 17,
+        "ordinate_spec_data_type": quantity, "orddenom_spec_data_type": 0,
+        "z_axis_spec_data_type": 0, "abscissa_axis_units_lab": "s", "ordinate_axis_units_lab": unit,
+    }  # fmt: skip
+
+
+def _universal(binary: int) -> Writer:
+    return lambda path, *recorded: write_universal(path, universal_record(*recorded, binary))
 
 
 def _matlab(*, packed: bool) -> Writer:
@@ -110,29 +142,65 @@ def _matlab(*, packed: bool) -> Writer:
     return write
 
 
-def _structure(path: Path, values: NDArray[np.float64], rate: float, unit: str) -> None:
-    scipy.io.savemat(path, {"plate": {"Force": values, "Fs": rate, "unit": unit}})
+def write_matlab(path: Path, values: NDArray[np.float64], entries: list[Entry]) -> None:
+    inner = {key: value for owner, key, value in entries if owner != "file"}
+    outer = {key: value for owner, key, value in entries if owner == "file"}
+    scipy.io.savemat(path, {"plate": {"Force": values, **inner}, **outer}, long_field_names=True)
 
 
-def _matlab73(path: Path, values: NDArray[np.float64], rate: float, unit: str) -> None:
+def write_matlab_4(path: Path, values: NDArray[np.float64], entries: list[Entry]) -> None:
+    header = {key: value for _, key, value in entries}
+    scipy.io.savemat(path, {"Force": values, **header}, format="4")
+
+
+def write_matlab_73(path: Path, values: NDArray[np.float64], entries: list[Entry]) -> None:
     with h5py.File(path, "w", userblock_size=512) as file:
-        file["Force"] = values[np.newaxis]
-        file["Force"].attrs["MATLAB_class"] = np.bytes_("double")
-        file["Fs"] = np.array([[rate]])
-        file["Force"].attrs["unit"] = unit
+        variables = {"Force": values, **{key: value for _, key, value in entries}}
+        for key, value in variables.items():
+            is_text = isinstance(value, str)
+            codes = [ord(c) for c in value] if is_text else value
+            file[key] = np.atleast_2d(np.asarray(codes, dtype="u2" if is_text else "f8")).T
+            file[key].attrs["MATLAB_class"] = np.bytes_("char" if is_text else "double")
     with path.open("r+b") as file:
         file.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\0\2IM")
 
 
-def _tdms(path: Path, values: NDArray[np.float64], rate: float, unit: str) -> None:
-    properties = {
-        "wf_increment": 1 / rate,
-        "unit_string": unit,
-        "wf_start_time": np.datetime64("2024-05-06T10:00:00"),
-    }
+def write_tdms(path: Path, values: NDArray[np.float64], entries: list[Entry]) -> None:
+    properties: dict[str, dict[str, Any]] = {"array": {}, "group": {}, "file": {}}
+    for owner, key, value in entries:
+        is_rate = key == "Fs"
+        properties[owner]["wf_increment" if is_rate else key] = 1 / value if is_rate else value
+    objects = [
+        nptdms.RootObject(properties["file"]),
+        nptdms.GroupObject("plate", properties["group"]),
+    ]
     with nptdms.TdmsWriter(path) as file:
         for part in np.array_split(values, 3):
-            file.write_segment([nptdms.ChannelObject("plate", "force", part, properties)])
+            channel = nptdms.ChannelObject("plate", "force", part, properties["array"])
+            file.write_segment([*objects, channel])
+
+
+def write_text(path: Path, values: NDArray[np.float64], entries: list[Entry]) -> None:
+    header = "".join(f"{key}: {value}\n" for _, key, value in entries)
+    np.savetxt(path, values, "%.12g", header=f"{header}Force", comments="")
+
+
+# Formats with a header of any entries.
+WITH_HEADER: dict[str, HeaderWriter] = {
+    "t.csv": write_text,
+    "a.h5": write_hdf5,
+    "a.nc": write_hdf5,
+    "5.mat": write_matlab,
+    "4.mat": write_matlab_4,
+    "73.mat": write_matlab_73,
+    "a.tdms": write_tdms,
+}
+
+
+def _stating(write: HeaderWriter, unit_key: str, rate_key: str, *others: Entry) -> Writer:
+    return lambda path, values, rate, unit: write(
+        path, values, [("array", unit_key, unit), ("array", rate_key, rate), *others]
+    )
 
 
 # By name of the file; those of `SOUND` hold no unit.
@@ -156,15 +224,20 @@ WITH_UNIT: dict[str, Writer] = {
         "***End_of_Header***\nX_Value\tPlate\n",
         "\t",
     ),
-    "plate.h5": _hdf5,
+    "plate.h5": _stating(write_hdf5, "units", "sample_rate", ("file", "date", "2024-05-06")),
     "plate.nc": _netcdf,
     "text.uff": _universal(0),
     "binary.uff": _universal(1),
     "plain.mat": _matlab(packed=False),
     "packed.mat": _matlab(packed=True),
-    "structure.mat": _structure,
-    "v73.mat": _matlab73,
-    "plate.tdms": _tdms,
+    "structure.mat": _stating(write_matlab, "unit", "Fs"),
+    "v73.mat": _stating(write_matlab_73, "unit", "Fs"),
+    "plate.tdms": _stating(
+        write_tdms,
+        "unit_string",
+        "Fs",
+        ("array", "wf_start_time", np.datetime64("2024-05-06T10:00:00")),
+    ),
 }
 WRITERS: dict[str, Writer] = SOUND | WITH_UNIT
 
@@ -174,3 +247,17 @@ def broadcast_chunk(date: str, clock: str) -> bytes:
     body = b"".ljust(320, b"\0") + date.encode() + clock.encode()
     body = body.ljust(602, b"\0")
     return b"bext" + struct.pack("<I", len(body)) + body
+
+
+def recording_file(path: Path | str, values: NDArray[np.float64] = FORCE) -> Path:
+    """Write the half sine in the format of a name of `WRITERS`, integers of 5000 N/FS."""
+    path = Path(path)
+    WRITERS[path.name](path, values / 5000 if path.name.startswith("pcm") else values, RATE, "N")
+    return path
+
+
+def patch(path: Path, at: int, *parts: bytes) -> Path:
+    """Replace bytes of a file from an index on; return its path."""
+    data, new = path.read_bytes(), b"".join(parts)
+    path.write_bytes(data[:at] + new + data[at:][len(new) :])
+    return path

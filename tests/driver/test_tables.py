@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import random
+import re
 from collections import Counter
 from dataclasses import dataclass, field
+from datetime import datetime, timedelta
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +16,7 @@ from recording_files import opened
 
 import thud
 from thud.base.units import UNITS, find_unit
-from thud.recordings.formats.text import read_table
+from thud.recordings.formats.text import read_channels, read_table
 from thud.studies.fitting.record import time_and_force
 
 if TYPE_CHECKING:
@@ -258,63 +260,112 @@ LAYOUTS = [
     ("daN", "\ufeffTime_ms;Force_daN;Remark", "{m};{a};"),
     ("kgf", "Time, s;Force, kgf", "{t} s;{a} kgf"),
     ("mV", "Time [s]\tForce [mV]", "{t}\t{a}"),
+    # With a rate in the header.
+    ("kN", "Sample rate;8 kHz\nUnit;kN\nForce", "{a};"),
+    ("kN", "Sampling Frequency (Hz): 8000\nForce (kN)", "{a}"),
+    ("kN", "// dt [us]: 125\n// unit: kN", "{a}"),
+    ("kN", "; Abtastrate = 8,0 kHz\n; Einheit = kN", "{A};"),
+    ("kN", "fs\t8000\nForce\n[kN]", "{A};"),
+    ("kN", "t_ms F_kN", "{m} {a}"),
+    ("kN", "Sample rate in Hz\t8000\nKraft in kN", "{a}"),
+    ("kN", "Zeit / s;Kraft / kN", "{T};{A}"),
+    ("kN", "Messung Nr. 3\nDatum;06.05.2024\n\nZeit;Kraft\ns;kN", "{T};{A}"),
+    ("kN", "time (s)\tforce / kN\tstate", "{t}\t{a}\tok"),
+    ("kN", '"time","Force, kN"', "{t},{a}"),
+    # Numbers of samples are no times, and these lines no factors.
+    ("N", "fs: 8000\nNo;Force [N]", "{i};{a}"),
+    ("N", "fs: 8000\nGain;1,0\nNo;Force [N]", "{i};{a}"),
+    ("N", "fs: 8000\nCalibration: 2026-05-06\nForce [N]", "{a}"),
+    # Commas between numbers.
+    ("N", "fs: 8000\nF [N];", "{A};"),
+    ("N", "fs: 8000\nF [N],G", "{a},0"),
+    ("N", "fs: 8.000 Hz", "{A};"),
 ]  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    "coding", [("utf-8", "\n"), ("utf-8-sig", "\r\n"), ("utf-16", "\r"), ("latin-1", "\r\n")]
+)
 @pytest.mark.parametrize(("unit", "head", "row"), LAYOUTS)
 def test_ordinary_layouts_are_read_with_their_units(
-    unit: str, head: str, row: str, tmp_path: Path
+    unit: str, head: str, row: str, coding: tuple[str, str], tmp_path: Path
 ) -> None:
     base, size = UNITS[unit]
     size *= SENSITIVITY if base == "V" else 1.0
-    lines = [
-        row.format(t=f"{i / RATE:.6f}", m=f"{1e3 * i / RATE:.3f}", a=f"{force / size:.9f}",
-                   b=f"{force / size / 2:.9f}", d=f"{force:.8E}".replace("E", "D"))
+    numbers = [
+        {"i": str(i), "t": f"{i / RATE:.6f}", "m": f"{1e3 * i / RATE:.3f}",
+         "a": f"{force / size:.9f}", "b": f"{force / size / 2:.9f}",
+         "d": f"{force:.8E}".replace("E", "D")}
         for i, force in enumerate(PULSE)
     ]  # fmt: skip
+    commas = [{key.upper(): cell.replace(".", ",") for key, cell in n.items()} for n in numbers]
+    lines = [row.format(**n, **c) for n, c in zip(numbers, commas, strict=True)]
     path = tmp_path / "plate.csv"
-    path.write_text("\n".join([head, *lines, ""]), encoding="utf-8")
+    text = "\n".join([head.removesuffix("\n"), *lines, ""]).lstrip("\n")
+    encoding, end = coding
+    path.write_bytes(text.replace("\n", end).encode(encoding, errors="ignore"))
     stated = {"calibration": f"{SENSITIVITY} N/V"} if base == "V" else {}
-    sums = {"channels": "sum"} if "F2" in head else {}
-    (signal,) = opened(path, **stated, **sums)
+    choice = {"channels": "sum"} if "F2" in head else {"channel": 1} if "],G" in head else {}
+    (signal,) = opened(path, **stated, **choice)
     force = signal.read(0, signal.n_sample)
-    np.testing.assert_allclose(force, PULSE * (1.5 if sums else 1.0), atol=1e-4)
+    np.testing.assert_allclose(force, PULSE * (1.5 if "F2" in head else 1.0), atol=1e-4)
     assert signal.sample_rate == pytest.approx(RATE, rel=1e-5)
-    if "F2" not in head and base != "V":  # a record of time and force in s and N
+    # A record of time and force in s and N.
+    if "F2" not in head and base != "V" and {"{t}", "{T}", "{m}"} & set(re.findall("{.}", row)):
         record = time_and_force(read_table(path))
         np.testing.assert_allclose(record[:, 1], PULSE, atol=1e-4)
         np.testing.assert_allclose(record[:, 0], np.arange(ROWS) / RATE, atol=1e-6)
 
 
+EXCEL = datetime(2026, 11, 23, 9, 58, 59, 980000)  # noqa: DTZ001 - spreadsheets have no time zone
+
+
 @pytest.mark.parametrize(
-    ("head", "row", "words"),
+    ("title", "shown"),
     [
-        ("Time [s];F1 [N];F2 [N]", "{t};{f}", naming("line 1", "3 titles", "2 columns")),
-        ("t, sec   State   a, V   F1, N   F9 [lbf]", "{t},,{f},{f}", naming("line 1")),
-        ("# Force [lbf]", "{t};{f}", naming("line 1", "1 title", "2 columns")),
-        ("# force in lbf", "{t} {f}", naming("line 1", "2 columns")),
-        ("Time [s];Force [stone]", "{t};{f}", naming("'stone'", "kN")),
-        ("Time [min^2];Force [N]", "{t};{f}", naming("column 1, 'Time'", "'min^2'", "ms")),
-        ("Time;Force [kN]\ns;N", "{t};{f}", naming("column 2", "kN", "N")),
-        ("Time;Force [kN]", "{t};{f} N", naming("column 2", "kN", "N")),
-        ("Unit: kN\nTime;Force [N]", "{t};{f}", naming("column 2", "kN", "N")),
-        ("Y_Unit_Label;N;N;m/s2\nTime;F1;F2", "{t};{f};{f}", naming("column 1, 'Time'", "'N'")),
-        ("x,State,F1 [N]\n,start,0.00", ",,{f}", naming("line 2", "'start'")),
-        ("# Time [s]   Force [lbf]", "{t},{f}", naming("line 1", "1 title", "2 columns")),
-        ("Column 1: Time [s]\nColumn 2: Force [lbf]", "{t}\t{f}", naming("line 1", "2 columns")),
-        ("Time [s];Force [lbf]\nTime [s];Force [N]", "{t};{f}", naming("line 1", "second line")),
+        ("Datum;Kraft [kN]", "%d.%m.%Y %H:%M:%S,%f"),
+        ("Datum;Uhrzeit;Kraft [kN]", "%d.%m.%Y;%H:%M:%S,%f"),
+        ("Time;Force [kN]", "%H:%M:%S.%f"),
+        ("Date;Force [kN]", "%Y-%m-%d %H:%M:%S.%f"),
+        ("Timestamp;Force [kN]", "%Y-%m-%dT%H:%M:%S.%fZ"),
+        ("Date;Force [kN]", "%m/%d/%Y %I:%M:%S.%f %p"),
+        ("Date;Force [kN]", "%M:%S.%f"),
     ],
 )
-def test_units_and_titles_that_do_not_fit_are_refused(
-    head: str, row: str, words: str, tmp_path: Path
-) -> None:
-    path = tmp_path / "plate.csv"
-    rows = [row.format(t=f"{i / RATE:.6f}", f=f"{force:.2f}") for i, force in enumerate(PULSE)]
-    path.write_text("\n".join([head, *rows, ""]), encoding="utf-8")
-    with pytest.raises(thud.InputError, match=words):
+def test_dates_and_times_of_day_show_no_rate(title: str, shown: str, tmp_path: Path) -> None:
+    mark = "," if ",%f" in shown else "."
+    rows = (
+        (EXCEL + timedelta(seconds=i / RATE)).strftime(shown)
+        + f";{force / 1e3:.6f}".replace(".", mark)
+        for i, force in enumerate(PULSE)
+    )
+    path = tmp_path / "excel.csv"
+    path.write_text("\n".join([title, *rows]), encoding="utf-8")
+    with pytest.raises(thud.InputError, match=naming("excel.csv", "sample_rate")):
         opened(path)
-    with pytest.raises(thud.InputError):
-        time_and_force(read_table(path))
+    (signal,) = opened(path, sample_rate=8000)
+    assert signal.sample_rate == RATE
+    np.testing.assert_allclose(signal.read(0, ROWS), PULSE, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("rate", "name", "unit", "encoding"),
+    [
+        ("サンプリング周波数: 8000 Hz", "力", "（N）", "cp932"),  # noqa: RUF001 - as printed
+        ("샘플링 주파수: 8000 Hz", "충격력", " (N)", "cp949"),
+        ("온도: 20 ℃\n샘플링 주파수: 8000 Hz", "충격력", " (N)", "cp949"),
+        ("Prüfer: Müller\nAbtastrate: 8000 Hz", "Stoßkraft", " (N)", "latin-1"),
+        ("Prüfer: Müller – Lab\nAbtastrate: 8000 Hz", "Stoßkraft", " (N)", "cp1252"),
+    ],
+)
+def test_headers_are_read_in_encodings_of_spreadsheets(
+    rate: str, name: str, unit: str, encoding: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "drop.csv"
+    rows = "\n".join(f"{force:.6f}" for force in PULSE)
+    path.write_bytes(f"{rate}\n{name}{unit}\n{rows}".encode(encoding))
+    (channel,) = read_channels(path)
+    assert (channel.sample_rate, channel.unit, channel.name) == (RATE, "N", name)
 
 
 @pytest.mark.parametrize("head", ["Time;Plate\n[s];[stone]", "[s];[stone]\nTime;Plate"])
