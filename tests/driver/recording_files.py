@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import struct
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -240,13 +239,6 @@ WITH_UNIT: dict[str, Writer] = {
     ),
 }
 WRITERS: dict[str, Writer] = SOUND | WITH_UNIT
-
-
-def broadcast_chunk(date: str, clock: str) -> bytes:
-    """Return the chunk by which broadcast WAV files tell when they were recorded."""
-    body = b"".ljust(320, b"\0") + date.encode() + clock.encode()
-    body = body.ljust(602, b"\0")
-    return b"bext" + struct.pack("<I", len(body)) + body
 
 
 def recording_file(path: Path | str, values: NDArray[np.float64] = FORCE) -> Path:

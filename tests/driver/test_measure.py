@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import pickle
-import re
 import subprocess
 import sys
 import tomllib
@@ -16,12 +15,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 import soundfile
-from conftest import REPOSITORY, codes, names_in, naming, noted, recorded
+from conftest import REPOSITORY, codes, names_in, noted, recorded
 from synthetic import half_sine, make_recording
 
 import thud
 from thud import cli
-from thud.recordings.checks.plate import check_plate
 from thud.recordings.config import Config, read_config
 from thud.recordings.instruments import AMPLITUDE_DECIBEL, Plate
 from thud.recordings.signal import Signal
@@ -30,12 +28,11 @@ from thud.report.contents import report_criteria
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from conftest import ErrorsOf
-
     from thud.level.assessment import Criterion
 
 
 FOLDER = REPOSITORY / "inputs/recordings"
+LAB = read_config(FOLDER / "lab.toml")
 TRUTH = tomllib.loads((FOLDER / "truth.toml").read_text())
 DROPS = [drop for drop in TRUTH["drop"] if drop["file"].startswith("drop_")]
 
@@ -51,19 +48,13 @@ def test_examples_are_measured_as_they_were_made(
     # The ball of finite elements with its default law lies 0.3 dB below the limit at 500 Hz.
     assert cli.main(["measure", *files, "--config", config, "--check", "-o", "out"]) == 3
     shown = capsys.readouterr().out
-    assert "The source does not conform to the limits of the rubber ball at 95 %" in shown
-    assert "hum of 50 Hz" in shown
+    assert "50 Hz" in shown
     rows = [line.split()[0] for line in shown.splitlines() if line.startswith("drop_")]
     # Two tables: levels are below the other results.
     assert rows == 2 * [drop["file"] for drop in DROPS[:2]]
     assert f"\nand {len(DROPS) - 2} more drops: out/report.json\n" in shown
-    assert set(names_in(tmp_path / "out")) >= {
-        "levels.csv",
-        "criteria.csv",
-        "report.html",
-        "report.json",
-        "report.pdf",
-    }
+    results = {"levels.csv", "criteria.csv", "report.html", "report.json", "report.pdf"}
+    assert set(names_in(tmp_path / "out")) >= results
     recording = thud.read_recording(files, config=config)
     truth = np.array([drop["levels"] for drop in DROPS])
     np.testing.assert_allclose(recording.average().drops.level, truth, atol=0.05)
@@ -106,7 +97,8 @@ def test_uncertainty_that_is_not_stated_never_sharpens_a_verdict(channel: str) -
         )
         return {entry.name: entry for entry in recording.assess().criteria}
 
-    lowest = criteria()["octave_31_5"]
+    silent = criteria()
+    lowest = silent["octave_31_5"]
     assert lowest.estimate.not_stated == ("calibration",)
     assert lowest.conforms == "undecided"
     assert np.isnan(lowest.probability)
@@ -115,56 +107,13 @@ def test_uncertainty_that_is_not_stated_never_sharpens_a_verdict(channel: str) -
     for factor, result in ((0.999, channel), (1.001, "undecided")):
         stated = criteria(calibration_uncertainty=factor * largest)["octave_31_5"]
         assert stated.conforms == result
-    assert criteria()["contact_time"].conforms == criteria()["contact_time"].conforms_if_stated
+    assert silent["contact_time"].conforms == silent["contact_time"].conforms_if_stated
     for key, names in (("mass", {"mass", "restitution"}), ("height", {"drop_height"})):
         without = {f"{key}_uncertainty": None, "calibration_uncertainty": 0.001}
         found = criteria(**without)  # type: ignore[arg-type]
         lacking = {name for name, entry in found.items() if entry.estimate.not_stated}
         assert names <= lacking
         assert all(found[name].conforms == "undecided" for name in lacking)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["missing.wav"], naming("missing.wav")),
-        (["kilo.csv"], naming("kilo.csv", "kN")),
-        (["drop.wav", "--height", "-1"], naming("height", -1.0)),
-        (["drop.wav", "--config", "no.toml"], naming("no.toml")),
-        (["drop.wav", "--channel", "9"], naming("drop.wav", "channel", 9)),
-    ],
-)
-@pytest.mark.usefixtures("working_directory")
-def test_bad_recordings_get_one_sentence(
-    arguments: list[str], words: str, tmp_path: Path, errors_of: ErrorsOf
-) -> None:
-    (tmp_path / "drop.wav").write_bytes((FOLDER / "drop_1.wav").read_bytes())
-    impact = thud.solve()
-    force = np.pad(impact.floor_force, 2000) / 1e3
-    np.savetxt("kilo.csv", np.c_[np.arange(len(force)) / impact.sample_rate, force])
-    errors = errors_of("measure", *arguments, "--calibration", "5000 N/FS", "-q")
-    assert re.search(words, errors)
-    assert errors.count("\n") == 1
-    assert not (tmp_path / "outputs").exists()
-
-
-@pytest.mark.parametrize(
-    ("config", "words"),
-    [
-        ({"source": "tire"}, naming("source", "'tire'", "'tyre'")),
-        ({"mass": -1.0}, naming("mass", -1.0)),
-        ({"height": 100}, naming("height", 100, "0.001 to 10 m")),
-        ({"date": 2024}, naming("date", 2024)),
-        ({"instruments": [3]}, naming("instruments", 3)),
-        ({"report": ["number"]}, naming("report", "a table")),
-    ],
-)
-def test_configurations_are_checked_when_they_are_stated(
-    config: dict[str, Any], words: str
-) -> None:
-    with pytest.raises(thud.InputError, match=words) as raised:
-        Config(**config)
-    assert "\n" not in str(raised.value)
 
 
 def test_configurations_hold_what_files_state() -> None:
@@ -183,19 +132,21 @@ def test_recording_has_the_name_of_its_first_signal() -> None:
     assert thud.read_recording(signals, config=Config()).name == "a"
 
 
-def example(name: Path | str, tmp_path: Path, *changes: tuple[str, str]) -> thud.Recording:
-    """Return an example measured with a configuration in which texts are changed."""
-    text = (FOLDER / "lab.toml").read_text()
-    for old, new in changes:
-        assert old in text
-        text = text.replace(old, new, 1)
-    (tmp_path / "lab.toml").write_text(text)
-    return thud.read_recording(FOLDER / name, config=tmp_path / "lab.toml")
+def example(path: Path | str = "drop_1.wav", **changes: Any) -> thud.Recording:  # noqa: ANN401
+    """Return an example measured with changes of its configuration and its plate."""
+    plate = {key: changes.pop(key) for key in [*changes] if key in Plate.__dataclass_fields__}
+    changes = changes | {"plate": replace(LAB.plate, **plate)}
+    return thud.read_recording(FOLDER / path, config=replace(LAB, **changes))
 
 
-def test_limits_of_the_configuration_are_those_of_the_verdict(tmp_path: Path) -> None:
-    limits = ("# [limits]", "[limits]\noctave_500 = [20.0, 30.0]\n#")
-    recording = example("drop_1.wav", tmp_path, limits)
+@pytest.fixture(scope="module")
+def first() -> thud.Recording:
+    """Return the first example."""
+    return example()
+
+
+def test_limits_of_the_configuration_are_those_of_the_verdict() -> None:
+    recording = example(limits={"octave_500": (20.0, 30.0)})
     verdict = recording.assess()
     assert verdict.conforms == "does not conform"
     assert [d.name for d in verdict.criteria if not d] == ["octave_500"]
@@ -205,27 +156,27 @@ def test_limits_of_the_configuration_are_those_of_the_verdict(tmp_path: Path) ->
     assert (row.criterion.lower, row.criterion.upper, row.has_own_limits) == (20.0, 30.0, True)
 
 
-def test_faults_of_the_samples_are_found_before_the_correction_of_a_plate(tmp_path: Path) -> None:
+def test_faults_of_the_samples_are_found_before_the_correction_of_a_plate(
+    first: thud.Recording, tmp_path: Path
+) -> None:
     values, rate = soundfile.read(FOLDER / "drop_1.wav")
     position = int((DROPS[0]["onset"] + 0.006) * rate)
     values[position : position + 2] = 0.0
     soundfile.write(tmp_path / "spike.wav", values, rate, "PCM_24")
-    whole, filled = example("drop_1.wav", tmp_path), example(tmp_path / "spike.wav", tmp_path)
-    np.testing.assert_allclose(filled.levels(), whole.levels(), atol=0.05)
+    filled = example(tmp_path / "spike.wav")
+    np.testing.assert_allclose(filled.levels(), first.levels(), atol=0.05)
     assert noted(filled.notes, "spikes").value == pytest.approx(2e3 / rate)
-    assert not {"spikes", "jump"} & {*codes(whole.notes)}
+    assert not {"spikes", "jump"} & {*codes(first.notes)}
     values[position : position + 96] = np.linspace(values[position - 1], values[position + 300], 96)
     soundfile.write(tmp_path / "jump.wav", values, rate, "PCM_24")
-    assert "jump" in codes(example(tmp_path / "jump.wav", tmp_path).notes)
+    assert "jump" in codes(example(tmp_path / "jump.wav").notes)
 
 
 @pytest.mark.parametrize("ending", ["wav", "csv", "flac"])
 def test_contact_times_of_the_examples_lie_within_their_uncertainty(ending: str) -> None:
     # The common error of the drops, that of a soft foot and of the edge that the correction of the
     # plate spreads, is not averaged away.
-    config = read_config(FOLDER / "lab.toml")
-    if ending == "csv":
-        config = replace(config, calibration=None, polarity=None)
+    config = replace(LAB, calibration=None, polarity=None) if ending == "csv" else LAB
     made = [drop for drop in TRUTH["drop"] if drop["file"].endswith("flac")]
     made = made if ending == "flac" else DROPS
     files = {FOLDER / drop["file"].replace("wav", ending): drop for drop in made}
@@ -256,46 +207,43 @@ def test_contact_times_of_finite_elements_lie_within_their_uncertainty(name: str
             assert abs(found.value - truth) <= found.expanded
 
 
-NOT_COUNTED = "uncertainty not stated, and not included: "
-
-
-def parts(recording: thud.Recording, criterion: int) -> dict[str, float]:
-    """Return the budget of a criterion."""
+def budget(recording: thud.Recording, criterion: int) -> dict[str, float]:
+    """Return the uncertainties of a criterion by their contributions."""
     found = recording.assess().criteria[criterion].estimate.contributions
     return {part.name: part.uncertainty for part in found}
+
+
+def not_stated(recording: thud.Recording) -> list[str]:
+    """Return the contributions that a note says are not stated."""
+    names = [n.others["names"] for n in recording.notes if n.code == "uncertainty_not_stated"]
+    return ", ".join(map(str, names)).split(", ")
 
 
 def test_uncertainty_of_the_calibration_is_counted_where_it_is_known() -> None:
     file, table = FOLDER / "drop_1.wav", FOLDER / "drop_1.csv"
     unknown = thud.read_recording(file, calibration="5000 N/FS")
     assert unknown.calibration_uncertainty is None
-    assert f"{NOT_COUNTED}calibration" in map(str, unknown.notes)
-    assert "calibration" not in parts(unknown, 0)
-    config = replace(read_config(FOLDER / "lab.toml"), polarity=None)
+    assert "calibration" in not_stated(unknown)
+    assert "calibration" not in budget(unknown, 0)
     number = Config(calibration=1.0, calibration_uncertainty=0.005)
     for known in (
-        thud.read_recording(file, config=config, calibration="5000 N/FS"),
-        thud.read_recording(table, config=replace(config, calibration=None)),
+        thud.read_recording(file, config=replace(LAB, polarity=None), calibration="5000 N/FS"),
+        thud.read_recording(table, config=replace(LAB, polarity=None, calibration=None)),
         thud.read_recording(table, config=Config(calibration_uncertainty=0.005)),
         thud.read_recording(table, config=number.updated(unit="V")),
     ):
         assert known.calibration_uncertainty == 0.005
-        assert not any("calibration" in str(note) for note in known.notes)
-        assert parts(known, 0)["calibration"] == pytest.approx(0.0434, rel=1e-3)
-    with pytest.raises(thud.InputError, match=naming("calibration_uncertainty", -1)):
-        thud.read_recording(table, config=Config(calibration_uncertainty=-1))
+        assert "calibration" not in not_stated(known)
+        assert budget(known, 0)["calibration"] == pytest.approx(0.0434, rel=1e-3)
 
 
-def test_uncertainty_of_the_resonance_is_part_of_the_levels(tmp_path: Path) -> None:
-    known = example("drop_1.wav", tmp_path)
-    unknown = example("drop_1.wav", tmp_path, ("f0_uncertainty = 0.005", "# "))
-    told = f"{NOT_COUNTED}resonance of the plate"
-    assert not any(told in str(note) for note in known.notes)
-    assert any(told in str(note) for note in unknown.notes)
+def test_uncertainty_of_the_resonance_is_part_of_the_levels(first: thud.Recording) -> None:
+    resonance = "resonance of the plate"
+    assert resonance not in not_stated(first)
+    assert resonance in not_stated(example(f0_uncertainty=None))
     # Of the levels that a resonance higher by 0.5 % gives.
-    higher = example("drop_1.wav", tmp_path, ("f0 = 1100.0", "f0 = 1105.5"))
-    change = higher.levels()[-1] - known.levels()[-1]
-    assert parts(known, 4)["plate"] == pytest.approx(abs(change), rel=0.05)
+    change = example(f0=1105.5).levels()[-1] - first.levels()[-1]
+    assert budget(first, 4)["plate"] == pytest.approx(abs(change), rel=0.05)
 
 
 def test_peaks_of_noise_are_not_exact() -> None:
@@ -310,16 +258,14 @@ def test_peaks_of_noise_are_not_exact() -> None:
         peaks = next(d for d in found.assess().criteria if d.name == "peak_count")
         known = "conforms" if expected == 1 else "does not conform"
         assert peaks.conforms == (known if np.isfinite(expected) else "undecided")
-        assert any("noise" in note.message for note in found.notes if note.is_warning) == np.isnan(
-            expected
-        )
+        assert ("peaks_unknown" in codes(found.notes)) == np.isnan(expected)
 
 
-def test_drops_without_a_restitution_are_told() -> None:
-    config = replace(read_config(FOLDER / "lab.toml"), mass=None)
+def test_drops_without_a_restitution_are_noted() -> None:
     files = [FOLDER / "drop_1.wav", FOLDER / "three_drops.flac"]
-    recording = thud.read_recording(files, config=config)
-    assert any(re.search(naming("restitution", 3, 4), str(note)) for note in recording.notes)
+    recording = thud.read_recording(files, config=replace(LAB, mass=None))
+    note = noted(recording.notes, "restitution_partly_known")
+    assert (note.value, note.high) == (3, 4)
 
 
 @pytest.mark.slow
@@ -340,7 +286,7 @@ def test_results_are_there_where_the_screen_takes_nothing(tmp_path: Path) -> Non
 
 
 def test_drops_hold_no_more_than_their_force() -> None:
-    recording = thud.read_recording(FOLDER / "three_drops.flac", config=FOLDER / "lab.toml")
+    recording = example("three_drops.flac")
     for drop in recording.drops:
         known = 3 * drop.force.nbytes + drop.contact.covariance.nbytes
         assert len(pickle.dumps(drop)) < known + 20_000
@@ -362,17 +308,7 @@ def test_outliers_of_all_quantities_are_marked() -> None:
     assert all(outlier in found.notes for outlier in found.outliers)
 
 
-def test_plate_is_that_of_the_configuration(tmp_path: Path) -> None:
-    plate = (
-        "f0_uncertainty = 0.005",
-        "f0_uncertainty = 1e-4\ntime_constant = 1\nfull_scale = 4e3\nlinearity = [[5, 5], [5e3, 5e3]] #",  # noqa: E501
-    )
-    found = example("drop_1.wav", tmp_path, plate)
-    assert [met for met, _ in check_plate(found.config.plate).values()] == [
-        False,
-        True,
-        False,
-        True,
-    ]
-    assert noted(found.notes, "plate_low").others["frequency"] == 0.2
-    assert noted(found.notes, "plate_range").value == 4000
+def test_plate_is_compared_with_the_standard() -> None:
+    notes = example(time_constant=1.0, full_scale=4e3).notes
+    assert noted(notes, "plate_low").others["frequency"] == 0.2
+    assert noted(notes, "plate_range").value == 4000

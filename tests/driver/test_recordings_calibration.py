@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-import soundfile
 from conftest import codes, naming, noted
+from recording_files import noisy
 from scipy.signal import cont2discrete, lfilter
-from synthetic import half_sine
 
 from thud import InputError, cli
 from thud.recordings.calibration import calibrate
@@ -23,7 +22,6 @@ from thud.recordings.signal import Signal
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from conftest import ErrorsOf
     from numpy.typing import NDArray
 
     from thud.recordings.force_units import Calibration
@@ -62,11 +60,6 @@ def recorded(  # noqa: PLR0913 - what differs between records
     level = high_pass(load(ends, ramp, 5 + rest + 5 * (not single)), time_constant)
     rng = np.random.default_rng(seed)
     return level + rng.normal(0, noise, level.size) + 0.3 + 3e-6 * np.arange(level.size)
-
-
-def noisy(level: NDArray[np.float64], deviation: float, seed: int = 1) -> NDArray[np.float64]:
-    """Return a level with white noise of a standard deviation."""
-    return level + np.random.default_rng(seed).normal(0, deviation, level.size)
 
 
 def calibrated(level: NDArray[np.float64]) -> tuple[Calibration, float, float]:
@@ -139,11 +132,6 @@ def test_record_is_within_its_uncertainty(level: NDArray[np.float64], limit: flo
     assert abs(error) < 3.5 * uncertainty < 3.5 * limit
 
 
-def test_record_without_droop_has_a_minimum_time_constant() -> None:
-    found, *_ = calibrated(recorded(math.inf, 1))
-    assert 100 < noted(found.notes, "no_droop").low < 1e5
-
-
 @pytest.mark.parametrize(
     ("level", "words"),
     [
@@ -167,29 +155,38 @@ def test_records_that_are_no_calibration_are_refused(
         calibrated(level)
 
 
-def test_command_states_the_time_constant(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    ("options", "origin", "lacking"),
+    [
+        ("--force 250 --uncertainty 1e-3", "250 N", None),
+        ("--force 250", "250 N", "--uncertainty"),
+        ("--mass 25.5 --uncertainty 1e-3", "g = 9.80665 m/s2", "--gravity"),
+        ("--mass 25.5 --uncertainty 1e-3 --gravity 9.8", "g = 9.8 m/s2", None),
+    ],
+)
+def test_command_prints_the_calibration_and_names_what_is_lacking(
+    options: str,
+    origin: str,
+    lacking: str | None,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    level = recorded(5.0, 1)
-    rows = "\n".join(f"{k / RATE:.3f},{one:.6f}" for k, one in enumerate(level))
-    (tmp_path / "weight.csv").write_text(f"Time [s],Force [V]\n{rows}\n")
-    arguments = ["calibrate", str(tmp_path / "weight.csv"), "--force", "250"]
-    assert cli.main([*arguments, "--uncertainty", "0.001"]) == 0
+    rows = np.column_stack([TIME, recorded(5.0, 1)])
+    path = tmp_path / "weight.csv"
+    np.savetxt(path, rows, "%.6f", ",", header="Time [s],Force [V]", comments="")
+    assert cli.main(["calibrate", str(path), *options.split()]) == 0
     shown = capsys.readouterr()
     lines = tomllib.loads(shown.out)
     assert float(lines["calibration"].split()[0]) == pytest.approx(FORCE, rel=0.004)
-    assert 0.001 < lines["calibration_uncertainty"] < 0.004
-    assert re.search(r"# droop with a time constant of [45]\.\d+ s, standard", shown.out)
-    assert not shown.err
-    assert cli.main(arguments) == 0
-    assert "(--uncertainty)" in capsys.readouterr().err
+    assert 1e-4 < lines["calibration_uncertainty"] < 0.004
+    assert origin in shown.out
+    # The time constant, s.
+    assert re.search(r"\b[45]\.\d+ s\b", shown.out)
+    assert (lacking in shown.err) if lacking else not shown.err
 
 
-def test_gravity_of_a_mass_is_stated_or_counts_as_uncertainty(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    level = recorded(math.inf, 1, noise=1e-4)
-    signal = Signal.from_array(level, RATE)
+def test_gravity_of_a_mass_is_stated_or_counts_as_uncertainty() -> None:
+    signal = Signal.from_array(recorded(math.inf, 1, noise=1e-4), RATE)
     stated = calibrate(signal, mass=10.0, gravity=9.798, unit="V")
     assert float(stated.chain.split()[0]) == pytest.approx(97.98, rel=1e-4)
     assert stated.origin.startswith("2 steps of 10 kg (g = 9.798 m/s2)")
@@ -201,34 +198,8 @@ def test_gravity_of_a_mass_is_stated_or_counts_as_uncertainty(
     assert stated.uncertainty is not None
     assert silent.uncertainty == pytest.approx(math.hypot(stated.uncertainty, spread))
     assert calibrate(signal, mass=10.0, gravity=9.8, unit="V", uncertainty=1e-3).notes[1:] == ()
-    *_, note = silent.notes
+    note = silent.notes[-1]
     assert (note.code, note.low, note.high) == ("gravity_assumed", 9.780, 9.833)
-    for given, words in (
-        ({"mass": 10.0, "gravity": 98.0}, naming("gravity", "9.76 to 9.84")),
-        ({"mass": 10.0, "gravity": math.nan}, naming("gravity", "nan")),
-        ({"force": 98.0, "gravity": 9.81}, naming("gravity", "mass")),
-        *(({"mass": mass}, naming("mass", mass)) for mass in ("2", [2.0], True)),
-    ):
-        with pytest.raises(InputError, match=words):
-            calibrate(signal, unit="V", **given)
-    np.savetxt(tmp_path / "weight.csv", level, header="Force [V]", comments="")
-    arguments = ["calibrate", str(tmp_path / "weight.csv"), "--mass", "10", "--uncertainty", "1e-3"]
-    assert cli.main(arguments) == 0
-    assert "--gravity" in capsys.readouterr().err
-    assert cli.main([*arguments, "--gravity", "9.798"]) == 0
-    shown = capsys.readouterr()
-    assert "(g = 9.798 m/s2)" in shown.out
-    assert not shown.err
-
-
-def test_plateau_at_full_scale_is_refused(tmp_path: Path) -> None:
-    level = 1.12 * load([5.0, 13.0], 0.3, 20.0)
-    path = tmp_path / "weight.wav"
-    soundfile.write(path, np.minimum(level, 0.9999), int(RATE), "PCM_16")
-    with pytest.raises(InputError, match=naming("weight.wav", "clipped")):
-        calibrate(path, force=FORCE)
-    soundfile.write(path, 0.9 / 1.12 * level, int(RATE), "PCM_16")
-    assert float(calibrate(path, force=FORCE).chain.split()[0]) == pytest.approx(FORCE / 0.9, 1e-4)
 
 
 def test_coarse_record_that_rests_at_one_value_is_not_clipped() -> None:
@@ -239,32 +210,14 @@ def test_coarse_record_that_rests_at_one_value_is_not_clipped() -> None:
 
 
 def test_steps_in_one_direction_are_each_the_whole_force() -> None:
-    time = np.arange(0, 15, 1 / RATE)
-    level = sum(np.clip((time - begin) / 0.3, 0, 1) for begin in (4.0, 9.0))
-    level += np.random.default_rng(1).normal(0, 0.01, time.size)
-    found, error, _ = calibrated(level)
+    level = sum(np.clip((TIME - begin) / 0.3, 0, 1) for begin in (4.0, 9.0))
+    found, error, _ = calibrated(noisy(level, 0.01))
     assert abs(error) < 0.01
     assert codes(found.notes)[1:] == ["steps_in_one_direction", "known_force_uncertain"]
     assert found.notes[1].value == FORCE
-    assert codes(calibrated(recorded(math.inf, 1))[0].notes) == [
-        "no_droop",
-        "known_force_uncertain",
-    ]
-
-
-def test_messages_name_the_decimal_comma_and_the_channels(
-    tmp_path: Path, errors_of: ErrorsOf
-) -> None:
-    path = tmp_path / "cells.csv"
-    path.write_text("Time [s],F1 [N],F2 [N]\n" + "\n".join(f"{k}e-3,{k},2" for k in range(99)))
-    assert re.search(
-        naming("--channel", "2 'F1'", "3 'F2'"), errors_of("calibrate", path, "--mass", "10")
-    )
-    assert "'2,5' has a decimal comma" in errors_of("calibrate", path, "--mass", "2,5")
-    assert "'heavy' is not a number" in errors_of("calibrate", path, "--mass", "heavy")
-    for text in ("400,08", "400,08 N/V"):
-        errors = errors_of("measure", path, "--channel", "F1", "--calibration", text)
-        assert re.search(naming("'400' is not a number", "decimal point"), errors)
+    found, *_ = calibrated(recorded(math.inf, 1))
+    assert codes(found.notes) == ["no_droop", "known_force_uncertain"]
+    assert 100 < found.notes[0].low < 1e5
 
 
 def test_record_without_times_has_no_time_constant(tmp_path: Path) -> None:
@@ -320,10 +273,17 @@ def deviations(found: TappedPlate, frequency: float, quality: float) -> tuple[fl
     )
 
 
-@pytest.mark.parametrize("hum", [0.0, 0.02])
-@pytest.mark.parametrize("rate", [10_000.0, 51_200.0])
-@pytest.mark.parametrize("count", [1, 3])
-@pytest.mark.parametrize(("frequency", "quality"), [(900.0, 10.0), (1600.0, 60.0)])
+@pytest.mark.parametrize(
+    ("frequency", "quality", "count", "rate", "hum"),
+    [
+        (900.0, 10.0, 1, 10_000.0, 0.0),
+        (900.0, 10.0, 1, 51_200.0, 0.02),
+        (900.0, 10.0, 3, 10_000.0, 0.02),
+        (1600.0, 60.0, 1, 10_000.0, 0.02),
+        (1600.0, 60.0, 1, 51_200.0, 0.0),
+        (1600.0, 60.0, 3, 10_000.0, 0.0),
+    ],
+)
 def test_taps_show_the_resonance_of_the_plate(
     frequency: float, quality: float, count: int, rate: float, hum: float
 ) -> None:
@@ -398,55 +358,30 @@ def test_misfit_of_close_modes_counts_as_uncertainty(second: float, quality: flo
 def test_clock_of_the_recorder_limits_the_frequency() -> None:
     found = calibrate_tap(tapped([(1100.0, 30.0, 1.0)], 1, count=3, noise=1e-6))
     assert found.frequency_uncertainty == pytest.approx(1e-4, rel=0.01)
-    assert "0.01 % for the clock" in str(found)
 
 
 def test_second_resonance_is_stated() -> None:
     found = calibrate_tap(tapped([(1100.0, 30.0, 0.7), (2300.0, 40.0, 0.3)], 1, duration=5e-4))
     assert np.abs(deviations(found, 1100, 30)).max() < 4
     assert found.others == pytest.approx([2300], rel=1e-3)
-    assert "also resonances at 2300 Hz" in str(found)
-
-
-@pytest.mark.parametrize(
-    ("level", "rate", "words"),
-    [
-        (np.zeros(20_000), 2e4, naming("recording", "no tap")),
-        (np.zeros(0), 2e4, naming("recording", "empty")),
-        (noisy(np.zeros(20_000), 1.0), 2e4, naming("recording", "no tap")),
-        (np.zeros(20_000), 1000.0, naming("sample rate", "2000 Hz")),
-        (noisy(np.repeat([0.0, 1.0], [9_990, 10_010]), 0.01), 2e4, naming("no tap", "pressed")),
-        (noisy(half_sine(2e4, 0.2, 20_000, 1.0, 0.001), 0.01), 2e4, naming("no resonance")),
-        # A ball and its bounce.
-        (noisy(sum(half_sine(2e4, t, 30_000, 1500.0, 0.02) for t in (0.2, 0.9)), 1.0), 2e4,
-         naming("no tap", "drop")),
-    ],
-)  # fmt: skip
-def test_records_without_a_resonance(level: NDArray[np.float64], rate: float, words: str) -> None:
-    with pytest.raises(InputError, match=words):
-        calibrate_tap(Signal.from_array(level, rate))
 
 
 def test_command_prints_the_lines_of_the_plate(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], errors_of: ErrorsOf
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     record = tapped([(1100.0, 30.0, 1.0)], 1, count=2)
-    level = record.read(0, record.n_sample)
     path = tmp_path / "tap.csv"
-    rows = "\n".join(f"{k / record.sample_rate:.5f},{one:.6f}" for k, one in enumerate(level))
-    path.write_text(f"Time [s],Level\n{rows}\n")
+    level = record.read(0, record.n_sample)
+    rows = np.column_stack([np.arange(level.size) / record.sample_rate, level])
+    np.savetxt(path, rows, "%.6f", ",", header="Time [s],Level", comments="")
     assert cli.main(["calibrate", "--tap", str(path)]) == 0
     shown = capsys.readouterr()
     (tmp_path / "lab.toml").write_text(shown.out)
     plate = read_config(tmp_path / "lab.toml").plate
     assert plate is not None
     assert plate.f0 == pytest.approx(1100, rel=1e-3)
-    assert plate.Q is not None
     assert abs(plate.Q - 30) < 0.6
     assert plate.f0_uncertainty is not None
     assert 1e-6 < plate.f0_uncertainty < 1e-3
     assert "# 2 taps in" in shown.out
     assert not shown.err
-    assert re.search(
-        naming("--mass", "--tap"), errors_of("calibrate", "--tap", str(path), "--mass", "5")
-    )

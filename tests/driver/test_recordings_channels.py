@@ -179,9 +179,14 @@ def test_faults_of_single_load_cells_are_found(tmp_path: Path) -> None:
     assert (spikes.others["part"], spikes.value) == ("cells.h5, F1", pytest.approx(0.0625))
     np.testing.assert_allclose(found.levels(), summed(path).levels(), atol=0.02)
     for code, changed in (("cell_sign", -first), ("cell_without_force", record(9, share=0.0))):
-        # Neither makes another cell the sum.
         parts = {n.others["part"] for n in summed(path, F1=changed).notes if n.code == code}
         assert parts == {"cells.h5, F1"}
+
+
+def test_inverted_load_cell_does_not_make_another_one_the_sum(tmp_path: Path) -> None:
+    cells = {name: record(i, share=0.25) for i, name in enumerate(NAMES)}
+    found = summed(tmp_path / "cells.h5", **cells | {"F4": -cells["F4"]})
+    assert noted(found.notes, "cell_sign").others["part"] == "cells.h5, F4"
 
 
 def test_one_drop_on_each_of_two_plates(tmp_path: Path) -> None:

@@ -123,13 +123,6 @@ def test_factor_and_offset_of_netcdf_are_applied(tmp_path: Path) -> None:
     np.testing.assert_allclose(read(path), FORCE, atol=1e-9)
 
 
-def test_unit_of_the_user_replaces_units_that_disagree(tmp_path: Path) -> None:
-    with h5py.File(tmp_path / "a.h5", "w") as file:
-        file["Force_kN"], file.attrs["Fs"] = FORCE, RATE
-        file["Force_kN"].attrs["units"] = "N"
-    np.testing.assert_allclose(read(tmp_path / "a.h5", unit="N"), FORCE)
-
-
 # Units of data set 164 per m and per N, and labels with newtons per unit.
 SYSTEMS = {"none": None, "SI": (1.0, 1.0), "IN": (39.37007874, 0.2248089431)}
 LABELS = {"NONE": 0.0, "N": 1.0, "kN": 1e3, "lbf": POUND, "V": None, "m/s2": None}
@@ -244,30 +237,31 @@ def big_endian_mat(version: int) -> bytes:
 def netcdf_times(path: Path, step: float, units: str, **attributes: float) -> None:
     """Write the force in N with times in a unit."""
     with h5py.File(path, "w") as file:
-        file["force"], file["time"] = FORCE, (np.arange(FORCE.size) * step).astype("i8")
-        file["force"].attrs["units"] = "N"
+        file["F_N"], file["time"] = FORCE, (np.arange(FORCE.size) * step).astype("i8")
+        file["F_N"].attrs["units"] = "lbf" if attributes else "N"
         file["time"].attrs.update(units=units, **attributes)
 
 
 @pytest.mark.parametrize(
-    ("name", "write"),
+    ("name", "write", "stated"),
     [
-        ("a.tdms", lambda path: path.write_bytes(big_endian_tdms())),
-        ("4.mat", lambda path: path.write_bytes(big_endian_mat(4))),
-        ("5.mat", lambda path: path.write_bytes(big_endian_mat(5))),
-        ("b.mat", lambda path: h5py.File(path, "w").update(M=np.stack([TIME, FORCE]))),
-        ("a.nc", lambda path: netcdf_times(path, 1, "seconds", scale_factor=1 / RATE)),
-        ("b.nc", lambda path: netcdf_times(path, 125_000, "nanoseconds since 2024-05-06")),
+        ("a.tdms", lambda path: path.write_bytes(big_endian_tdms()), {}),
+        ("4.mat", lambda path: path.write_bytes(big_endian_mat(4)), {}),
+        ("5.mat", lambda path: path.write_bytes(big_endian_mat(5)), {}),
+        ("b.mat", lambda path: h5py.File(path, "w").update(M=np.stack([TIME, FORCE])), {}),
+        ("a.nc", lambda path: netcdf_times(path, 125_000, "nanoseconds since 2024-05-06"), {}),
+        # The user decides between units of attribute and name.
+        ("b.nc", lambda path: netcdf_times(path, 1, "s", scale_factor=1 / RATE), {"unit": "N"}),
+        # The rate of times with an unknown factor is not known.
+        ("c.nc", lambda path: netcdf_times(path, 1, "s", gain=2.0),
+         {"unit": "N", "sample_rate": RATE}),
     ],
-)
-def test_other_layouts_are_read(name: str, write: Callable[[Path], None], tmp_path: Path) -> None:
+)  # fmt: skip
+def test_other_layouts_are_read(
+    name: str, write: Callable[[Path], None], stated: dict[str, Any], tmp_path: Path
+) -> None:
     write(tmp_path / name)
-    np.testing.assert_allclose(read(tmp_path / name), FORCE, atol=1e-9)
-
-
-def test_rate_of_the_user_replaces_times_with_an_unknown_factor(tmp_path: Path) -> None:
-    netcdf_times(tmp_path / "a.nc", 1, "seconds", scale_factor=1 / RATE, gain=2.0)
-    np.testing.assert_allclose(read(tmp_path / "a.nc", sample_rate=RATE), FORCE)
+    np.testing.assert_allclose(read(tmp_path / name, **stated), FORCE, atol=1e-9)
 
 
 @pytest.mark.parametrize("length", [0xFFFFFFFF, 0x7FFFF000, 0x7FFFFF00])
