@@ -95,7 +95,7 @@ def test_what_a_header_states_is_applied_or_refused(  # noqa: PLR0913 - each is 
     ]
     entries = [entries[k] for k in order if k < len(entries)]
     is_applied = name in {"a.h5", "a.nc"} and (owners[2], factor) == ("array", "scale_factor")
-    is_known = factor in OTHERS or is_applied or (value == 1.0 and factor != SENSITIVITY)
+    is_known = factor in OTHERS or is_applied or value == 1.0
     is_known = is_known or (factor == SENSITIVITY and bool(newtons) and bool(unit))
     scale = value if is_applied or (is_divided and not is_known) else 1.0
     stored = FORCE / (newtons or 1.0) / scale
@@ -106,9 +106,8 @@ def test_what_a_header_states_is_applied_or_refused(  # noqa: PLR0913 - each is 
     with pytest.raises(InputError, match=naming(name)):
         opened(tmp_path / name)
     # A calibration is that of the stored values, and the factor is named in a note.
-    (signal,) = opened(
-        tmp_path / name, calibration=1500.0 / float(stored[abs(stored).argmax()]), unit="V"
-    )
+    peak = float(stored[abs(stored).argmax()]) * (value if is_applied else 1.0)
+    (signal,) = opened(tmp_path / name, calibration=1500.0 / peak, unit="V")
     np.testing.assert_allclose(signal.read(0, signal.n_sample), FORCE, atol=1e-6)
     if not is_known and factor != SENSITIVITY:
         assert factor in str(noted(signal.notes, "factor_not_applied").others["factor"])
