@@ -237,6 +237,7 @@ LAYOUTS = [
     ("N", "fs: 8000\nNo;Force [N]", "{i};{a}"),
     ("N", "fs: 8000\nGain;1,0\nNo;Force [N]", "{i};{a}"),
     ("N", "fs: 8000\nCalibration: 2026-05-06\nForce [N]", "{a}"),
+    ("N", "fs: 8000\nScale;full\nForce [N]", "{a}"),
     # Commas between numbers.
     ("N", "fs: 8000\nF [N];", "{A};"),
     ("N", "fs: 8000\nF [N],G", "{a},0"),
