@@ -61,9 +61,9 @@ def write(name: str, text: str | bytes) -> Path:
     return path
 
 
-def written(head: str, row: str | Callable[..., str] = "{t:.6f};{f:.2f}", **stated: Any) -> Any:  # noqa: ANN401
+def written(head: str, row: str | Callable[..., str] = "{t:.6f};{f:.2f}") -> list[Signal]:
     """Return the channels of a table of time and force below a head."""
-    return opened(write("plate.csv", head + rows_of(row)), **stated)
+    return opened(write("plate.csv", head + rows_of(row)))
 
 
 def sound_file(values: ArrayLike, kind: str = "DOUBLE") -> Path:
@@ -72,30 +72,29 @@ def sound_file(values: ArrayLike, kind: str = "DOUBLE") -> Path:
     return Path("plate.wav")
 
 
-def sound(values: ArrayLike, kind: str = "DOUBLE", **stated: Any) -> Any:  # noqa: ANN401
+def sound(values: ArrayLike, kind: str = "DOUBLE", **stated: Any) -> list[Signal]:  # noqa: ANN401
     """Return the channels of a sound."""
     return opened(sound_file(values, kind), **stated)
 
 
-def pcm(**stated: Any) -> Any:  # noqa: ANN401
+def pcm(**stated: Any) -> list[Signal]:  # noqa: ANN401
     """Return the channels of a sound of integers."""
     return sound(FORCE / 5000, "PCM_24", **stated)
 
 
-def header(name: str, *entries: tuple[str, str, Any], values: ArrayLike = FORCE) -> Any:  # noqa: ANN401
+def header(name: str, *entries: tuple[str, str, Any]) -> list[Signal]:
     """Return the channels of a file with entries in its header and a rate."""
-    path = Path(name)
-    WITH_HEADER[name](path, np.asarray(values), [("array", "Fs", RATE), *entries])
-    return opened(path)
+    WITH_HEADER[name](Path(name), FORCE, [("array", "Fs", RATE), *entries])
+    return opened(name)
 
 
-def matlab(**variables: Any) -> Any:  # noqa: ANN401
+def matlab(**variables: Any) -> list[Signal]:  # noqa: ANN401
     """Return the channels of a MATLAB file of variables."""
     scipy.io.savemat("a.mat", variables)
     return opened("a.mat")
 
 
-def hdf5(fill: Callable[[h5py.File], object], name: str = "new.h5") -> Any:  # noqa: ANN401
+def hdf5(fill: Callable[[h5py.File], object], name: str = "new.h5") -> list[Signal]:
     """Return the channels of an HDF5 file that a function fills or changes."""
     if name in WRITERS:
         recording_file(name)
@@ -104,7 +103,7 @@ def hdf5(fill: Callable[[h5py.File], object], name: str = "new.h5") -> Any:  # n
     return opened(name)
 
 
-def netcdf(**attributes: Any) -> Any:  # noqa: ANN401
+def netcdf(**attributes: Any) -> list[Signal]:  # noqa: ANN401
     """Return the channels of a NetCDF file whose force has attributes."""
     return hdf5(lambda file: file["force"].attrs.update(attributes), "plate.nc")
 
@@ -133,7 +132,7 @@ def bomb(name: str) -> Path:
     return write(name, begin + struct.pack("<II", 15, len(packed)) + packed)
 
 
-def text(content: str) -> Any:  # noqa: ANN401
+def text(content: str) -> list[Signal]:
     """Return the channels of a table."""
     return opened(write("plate.csv", content))
 
