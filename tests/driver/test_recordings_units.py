@@ -249,6 +249,8 @@ def netcdf_times(path: Path, step: float, units: str, **attributes: float) -> No
         ("5.mat", lambda path: path.write_bytes(big_endian_mat(5)), {}),
         ("b.mat", lambda path: h5py.File(path, "w").update(M=np.stack([TIME, FORCE])), {}),
         ("a.nc", lambda path: netcdf_times(path, 125_000, "nanoseconds since 2024-05-06"), {}),
+        ("a.uff", lambda path: write_universal(path, universal_record(
+            FORCE, RATE / 1e3, "N", 1) | {"abscissa_axis_units_lab": "ms"}), {}),
         # The user decides between units of attribute and name.
         ("b.nc", lambda path: netcdf_times(path, 1, "s", scale_factor=1 / RATE), {"unit": "N"}),
         # The rate of times with an unknown factor is not known.
