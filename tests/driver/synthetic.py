@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+import thud
 from thud.level.estimate import UNKNOWN, Estimate
-from thud.recordings.background import Background, uniform_cells
-from thud.recordings.contact import Contact
+from thud.recordings.background import Background, remove_background, uniform_cells
+from thud.recordings.config import Config
+from thud.recordings.contact import Contact, find_contact
 from thud.recordings.drops import Section, cut_section, find_drops
 from thud.recordings.measured_drop import Drop
+from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
-    from thud.recordings.signal import Signal
+    from collections.abc import Iterable
+
+    from thud.level.estimate import Contribution
+    from thud.recordings.instruments import Plate, RecorderFilter
 
 # Exponents of the power spectra of noise.
 COLOURS = {"white": 0, "pink": 1, "brown": 2}
@@ -171,6 +177,22 @@ def cut_drops(signal: Signal) -> list[Section]:
     return [cut_section(signal, pulse) for pulse in find_drops(signal)[0]]
 
 
+def only_section(force: np.ndarray, rate: float, **signal: Any) -> Section:  # noqa: ANN401
+    """Return the section of the only drop in a force, N; a signal may have more properties."""
+    (section,) = cut_drops(replace(Signal.from_array(force, rate, "file.wav"), **signal))
+    return section
+
+
+def read(force: np.ndarray, rate: float, **stated: Any) -> thud.Recording:  # noqa: ANN401
+    """Return the recording of a force, N, with what is stated of it."""
+    return thud.read_recording(Signal.from_array(force, rate, "file.wav"), config=Config(**stated))
+
+
+def parts(contributions: Iterable[Contribution]) -> dict[str, float]:
+    """Return the uncertainties of contributions by name."""
+    return {part.name: part.uncertainty for part in contributions}
+
+
 def with_force(drop: Drop, force: np.ndarray, white: float | None = None) -> Drop:
     """Return a drop with another force, N, and another density of white noise, N2/Hz."""
     contact = replace(drop.contact, force=force)
@@ -178,3 +200,20 @@ def with_force(drop: Drop, force: np.ndarray, white: float | None = None) -> Dro
         variances = np.array([white, *contact.background.variances[1:]])
         contact = replace(contact, background=replace(contact.background, variances=variances))
     return replace(drop, contact=contact)
+
+
+def uncertain_contact(ratio: float) -> tuple[Section, Contact]:
+    """Return a contact whose time has a ratio to its uncertainty, of begin and end alike."""
+    section = only_section(half_sine(24e3, 0.1, 5300) + 5.0, 24e3)
+    contact = find_contact(section, *remove_background(section))
+    deviation = (contact.end.value - contact.begin.value) / ratio / np.sqrt(2)
+    ends = {n: replace(getattr(contact, n), uncertainty=deviation) for n in ("begin", "end")}
+    return section, replace(contact, **ends)
+
+
+def felt(force: np.ndarray, rate: float, instrument: Plate | RecorderFilter) -> np.ndarray:
+    """Return a force after an instrument, by its response to the spectrum of the force."""
+    length = 2**17
+    frequency = np.fft.rfftfreq(length, 1 / rate)
+    spectrum = np.fft.rfft(force, length) * instrument.response(frequency)
+    return np.fft.irfft(spectrum, length)[: len(force)]

@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 from scipy.ndimage import median_filter, uniform_filter1d
 from scipy.signal import resample
-from synthetic import cut_drops, half_sine, make_drop
+from synthetic import half_sine, make_drop, only_section
 
 from thud.impact.contact_time import contact_span
 from thud.level.levels import low_pass
@@ -20,7 +20,6 @@ from thud.recordings.contact import Contact, find_contact
 from thud.recordings.drops import Section
 from thud.recordings.instruments import Plate, RecorderFilter
 from thud.recordings.repair import check_aliasing
-from thud.recordings.signal import Signal
 
 RATE = 25600.0
 # Instruments without an effect.
@@ -136,14 +135,26 @@ def test_tables_of_shapes_are_smoothed_and_averaged() -> None:
     assert averaged[0, line] == pytest.approx(0.025, abs=2e-3)
 
 
-def edges_of(pulse: np.ndarray, noise: float, seed: int) -> tuple[Contact, np.ndarray]:
-    """Return the contact of a pulse at 16 times RATE, N, with noise, and its true begin and end."""
-    record = np.zeros(int(0.25 * RATE))
-    start = int(0.1 * RATE)
-    record[start:][: len(pulse[::16])] += pulse[::16]
+def found_contact(record: np.ndarray, rate: float) -> tuple[Contact, float]:
+    """Return the contact of a record with one drop, and the time at which its window begins, s."""
+    section = only_section(record, rate)
+    return find_contact(section, *remove_background(section)), section.start / rate
+
+
+def edge_errors(
+    pulse: np.ndarray, noise: float, seed: int, rate: float = RATE, factor: int = 16
+) -> list[tuple[float, float]]:
+    """Return errors of begin and end and their uncertainties, s.
+
+    The pulse, N, is given at a multiple of the rate and recorded with noise, N.
+    """
+    record, start = np.zeros(int(0.25 * rate)), int(0.1 * rate)
+    record[start:][: len(pulse[::factor])] += pulse[::factor]
     record += noise * np.random.default_rng(seed).normal(size=len(record))
-    found, first = found_contact(record, RATE)
-    return found, np.array(contact_span(pulse, 16 * RATE)) + (start - first) / RATE
+    found, first = found_contact(record, rate)
+    true = np.array(contact_span(pulse, factor * rate)) + start / rate - first
+    edges = found.begin, found.end
+    return [(e.value - t, e.uncertainty) for e, t in zip(edges, true, strict=True)]
 
 
 @pytest.mark.parametrize(
@@ -157,30 +168,18 @@ def test_edges_of_flanks_are_where_their_force_passes_a_percent(
     pulse = np.sin(np.pi * x) ** power + jump
     if steep:
         pulse = (1 - x) * (1 - np.exp(-steep * x))
-    found, true = edges_of(1500 * pulse / pulse.max(), 0.5, 1)
-    for edge, expected in zip((found.begin, found.end), true, strict=True):
-        assert abs(edge.value - expected) < min(3 * edge.uncertainty, 4e-5)
-        assert edge.uncertainty < 6e-5
+    for error, uncertainty in edge_errors(1500 * pulse / pulse.max(), 0.5, 1):
+        assert abs(error) < min(3 * uncertainty, 4e-5)
+        assert uncertainty < 6e-5
 
 
 def test_uncertainty_of_edges_is_the_scatter() -> None:
     """95 % intervals of lines, which are known to be no other shape, hold more of the errors."""
     pulse = 1500 * np.sin(np.pi * np.arange(int(0.02 * 16 * RATE)) / (0.02 * 16 * RATE))
-    scores = []
-    for seed in range(40):
-        found, true = edges_of(pulse, 15.0, seed)
-        scores += [
-            (edge.value - expected) / edge.uncertainty
-            for edge, expected in zip((found.begin, found.end), true, strict=True)
-        ]
+    errors = [edge for seed in range(40) for edge in edge_errors(pulse, 15.0, seed)]
+    scores = np.divide(*np.transpose(errors))
     assert np.mean(np.abs(scores) < 1.96) >= stats.binom.ppf(1e-3, 80, 0.95) / 80
     assert np.std(scores) > 0.3
-
-
-def found_contact(record: np.ndarray, rate: float) -> tuple[Contact, int]:
-    """Return the contact of a record with one drop, and the first sample of its window."""
-    (section,) = cut_drops(Signal.from_array(record, rate))
-    return find_contact(section, *remove_background(section)), section.start
 
 
 @pytest.mark.parametrize("rate", [8000.0, 51200.0])
@@ -193,16 +192,10 @@ def test_slow_release_ends_where_its_force_passes_a_percent(
     x = np.arange(int(0.022 * fine)) / (0.022 * fine)
     pulse = (1 - x) ** power * np.exp(-decay * x) * (1 - np.exp(-10 * x))
     pulse *= 1500 / pulse.max()
-    begin, end = contact_span(pulse, fine)
-    fall = (fine * end - np.flatnonzero(pulse > 300)[-1]) / fine
+    fall = contact_span(pulse, fine)[1] - np.flatnonzero(pulse > 300)[-1] / fine
     assert 4.3e-3 < fall < 6.7e-3
-    record = np.zeros(int(0.25 * rate))
-    record[int(0.1 * rate) :][: len(pulse[::32])] += pulse[::32]
-    record += np.random.default_rng(3).normal(size=len(record))
-    found, start = found_contact(record, rate)
-    for edge, expected in ((found.begin, begin), (found.end, end)):
-        late = edge.value - expected - int(0.1 * rate) / rate + start / rate
-        assert abs(late) < min(3 * edge.uncertainty, 1e-4)
+    for error, uncertainty in edge_errors(pulse, 1.0, 3, rate, 32):
+        assert abs(error) < min(3 * uncertainty, 1e-4)
 
 
 def test_scale_of_a_contact_is_its_peak_below_the_band_edge() -> None:
