@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from synthetic import half_sine, make_recording, only_section, read, uncertain_contact
+from synthetic import half_sine, make_recording, only_section, recording_of, uncertain_contact
 
 import thud
 from thud.level.levels import peak_count
@@ -26,10 +26,13 @@ if TYPE_CHECKING:
 # What is only imported for the table.
 __all__ = [
     "Config", "Signal", "band_filters", "filter_levels", "find_drops", "inf", "measure_drop", "nan",
-    "np", "only_section", "peak_count", "read", "repair", "uncertain_contact",
+    "np", "only_section", "peak_count", "recording_of", "repair", "uncertain_contact",
 ]  # fmt: skip
 
 PULSE = np.sin(np.pi * np.linspace(0, 1, 883))
+TIMES = 0.2 + np.arange(500) / 44100
+SHELL = thud.solve(duration=0.03)
+NOISE = np.random.default_rng(1).normal(size=1323)
 
 
 def write(name: str, text: str | bytes) -> Path:
@@ -49,7 +52,7 @@ def assess(**change: Any) -> thud.Verdict:  # noqa: ANN401
     return thud.assess_levels(**({"levels": [39, 31, 23, 17, 12.5]} | change))
 
 
-def recorded(*drops: tuple[float, float], lost: int = 0) -> NDArray[np.float64]:
+def half_sines(*drops: tuple[float, float], lost: int = 0) -> NDArray[np.float64]:
     """Return the force of half-sines of 20 ms at 48 kHz; at 8 ms, some samples are zero."""
     pulse = half_sine(192e3, 0.0, 3842)
     force, _ = make_recording(pulse, 192e3, rate=48e3, noise_db=60, drops=((0.0, 1.0), *drops))
@@ -57,14 +60,20 @@ def recorded(*drops: tuple[float, float], lost: int = 0) -> NDArray[np.float64]:
     return force
 
 
-def read_force(rows: ArrayLike | str) -> object:
+def read_force(source: str | list[ArrayLike]) -> object:
     """Return a record of times and forces, or of the text of a file."""
-    if isinstance(rows, str):
-        columns = read_table(write("plate.csv", rows))
-        return read_record(time_and_force(columns), "plate.csv")
-    return read_record(np.column_stack(rows))
+    if isinstance(source, list):
+        return read_record(np.column_stack(source))
+    return read_record(time_and_force(read_table(write("plate.csv", source))), "plate.csv")
 
 
-def rows_of(*last: str, form: str = "{};{}") -> str:
-    """Return a table of eight rows of integers, which decide no decimal mark, and more."""
-    return "".join(f"{row}\n" for row in (*(form.format(i, i % 3) for i in range(8)), *last))
+def number_table(last: str, form: str = "{};{}") -> object:
+    """Read eight rows of integers, which decide no decimal mark, and a last one."""
+    rows = [form.format(i, i % 3) for i in range(8)]
+    return read_table(write("plate.csv", "\n".join([*rows, last]) + "\n"))
+
+
+def named(*names: str) -> str:
+    """Write cases of these names; return their files."""
+    case = "&case name = '{}' /\n&ball /\n&drop /\n&model name = 'hollow_sphere' /\n"
+    return " ".join(str(write(f"{i}.nml", case.format(name))) for i, name in enumerate(names))

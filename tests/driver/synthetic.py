@@ -183,7 +183,7 @@ def only_section(force: np.ndarray, rate: float, **signal: Any) -> Section:  # n
     return section
 
 
-def read(force: np.ndarray, rate: float, **stated: Any) -> thud.Recording:  # noqa: ANN401
+def recording_of(force: np.ndarray, rate: float, **stated: Any) -> thud.Recording:  # noqa: ANN401
     """Return the recording of a force, N, with what is stated of it."""
     return thud.read_recording(Signal.from_array(force, rate, "file.wav"), config=Config(**stated))
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import naming
 from scipy.signal import butter, freqz_sos, sosfilt
 
 import thud
@@ -173,25 +172,6 @@ def test_silence_around_a_record_changes_nothing() -> None:
     np.testing.assert_allclose(
         filter_levels(longer, 25600), filter_levels(force, 25600), rtol=0, atol=1e-6
     )
-
-
-@pytest.mark.parametrize(
-    ("force", "rate", "words"),
-    [
-        ([], 44100, naming("force")),
-        ([0.0, 0.0], 44100, naming("force")),
-        ([1.0, np.nan], 44100, naming("force", "finite")),
-        ([1.0, 2.0], -1.0, naming("sample_rate", "-1.0", "1 to 1e+09 Hz")),
-        ([1.0, 2.0], np.nan, naming("sample_rate", "nan")),
-        ([1.0, 2.0], "fast", naming("sample_rate", "'fast'")),
-    ],
-)
-def test_useless_records_are_refused(force: list[float], rate: float, words: str) -> None:
-    with pytest.raises(thud.InputError, match=words):
-        filter_levels(force, rate)
-    if rate != 44100:
-        with pytest.raises(thud.InputError, match=words):
-            band_filters("octave", rate)
 
 
 def test_bands_at_rates_below_them_are_not_measured() -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import scipy.signal
 from conftest import codes, noted
-from synthetic import felt, make_drop, read
+from synthetic import felt, make_drop, recording_of
 
 import thud
 from thud.recordings.checks.plate import check_plate
@@ -39,7 +39,7 @@ FLAT = {"plate": Plate(flat_limit=1e5), "filter": NONE}
 def measured(force: np.ndarray, noise: float = 0.5, **config: Any) -> thud.Recording:  # noqa: ANN401
     """Return the recording of a force with white noise, N."""
     noisy = force + np.random.default_rng(1).normal(scale=noise, size=len(force))
-    return read(noisy, RATE, **STATED, **config)
+    return recording_of(noisy, RATE, **STATED, **config)
 
 
 def contributions(recording: thud.Recording) -> dict[str, np.ndarray]:
@@ -183,7 +183,7 @@ def test_stated_plate_that_is_not_in_the_record_is_told() -> None:
 
 
 def test_unstated_filter_is_assumed_by_the_rate() -> None:
-    recording = read(PULSE[::19], RATE / 19, **STATED, plate=Plate(flat_limit=1e5))
+    recording = recording_of(PULSE[::19], RATE / 19, **STATED, plate=Plate(flat_limit=1e5))
     assert "filter_assumed" in codes(recording.notes)
     # A quarter of the rate.
     assumed = RecorderFilter("bessel", 4, RATE / 19 / 4)
@@ -212,7 +212,7 @@ def test_share_that_is_not_stated_is_assumed_and_named() -> None:
 
 def test_peak_has_the_uncertainty_of_instruments_that_are_not_stated() -> None:
     doubted, known = (
-        read(PULSE, RATE, plate=Plate(flat_limit=limit), filter=NONE).drops[0].peak_force
+        recording_of(PULSE, RATE, plate=Plate(flat_limit=limit), filter=NONE).drops[0].peak_force
         for limit in (200.0, 1e5)
     )
     # The plate is 2 % off at 200 Hz, as a mass on a spring; the pulse lies near 25 Hz, and its

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import scipy.signal
 from conftest import codes
-from synthetic import felt, read
+from synthetic import felt, recording_of
 
 from thud.recordings.instruments import Plate, RecorderFilter
 
@@ -99,7 +99,7 @@ def row(
 @pytest.fixture(scope="module")
 def truth() -> thud.Recording:
     """Return the recording without a disturbance."""
-    return read(PULSE + NOISE, RATE, **STATED)
+    return recording_of(PULSE + NOISE, RATE, **STATED)
 
 
 @pytest.mark.parametrize(
@@ -142,7 +142,7 @@ def truth() -> thud.Recording:
 def test_disturbance_is_noted_and_in_the_interval(
     disturbance: np.ndarray, notes: list[dict[str, Any]], limit: float, truth: thud.Recording
 ) -> None:
-    recording = read(PULSE + NOISE + disturbance, RATE, **STATED)
+    recording = recording_of(PULSE + NOISE + disturbance, RATE, **STATED)
     found = [
         note.others | {"code": note.code, "value": note.value}
         for note in recording.notes
@@ -160,7 +160,7 @@ def test_disturbance_is_noted_and_in_the_interval(
 
 
 def test_step_of_the_offset_widens_what_is_measured(truth: thud.Recording) -> None:
-    (drop,) = read(PULSE + NOISE + 15 * (TIME > 0.002), RATE, **STATED).drops
+    (drop,) = recording_of(PULSE + NOISE + 15 * (TIME > 0.002), RATE, **STATED).drops
     for name, ratio in (("contact_time", 1), ("peak_force", 5), ("impulse", 5)):
         wider, narrower = (getattr(one, name).uncertainty for one in (drop, truth.drops[0]))
         assert wider > ratio * narrower
@@ -171,4 +171,4 @@ def test_quiet_next_to_little_noise_at_a_frequency_is_no_tone() -> None:
     draws = np.random.default_rng(81).normal(0, 0.3, 30720)
     time = np.arange(len(draws)) / 51.2e3
     pulse = 1500 * np.sin(np.pi * np.clip((time - 0.2) / 0.018, 0, 1))
-    assert "tone_removed" not in codes(read(pulse + draws, 51.2e3).notes)
+    assert "tone_removed" not in codes(recording_of(pulse + draws, 51.2e3).notes)

@@ -17,7 +17,7 @@ from synthetic import (
     make_recording,
     only_section,
     parts,
-    read,
+    recording_of,
     uncertain_contact,
     with_force,
 )  # fmt: skip
@@ -47,7 +47,7 @@ def pulse(impact: thud.Impact) -> np.ndarray:
 
 def drops(force: np.ndarray, rate: float, **stated: float | None) -> tuple[Drop, ...]:
     """Return the drops of a ball of 2.5 kg from 1 m."""
-    return read(force, rate, **{"height": 1.0, "mass": 2.5} | stated).drops
+    return recording_of(force, rate, **{"height": 1.0, "mass": 2.5} | stated).drops
 
 
 def falling(
@@ -135,10 +135,10 @@ def test_disagreement_of_impulse_and_bounces_is_not_averaged_away() -> None:
     )
     momentum = 1500 * 0.02 * 2 / np.pi
     fits = momentum / (1.75 * SPEED + 9.81 * 0.02)
-    alike = read(force, 24e3, height=1.0, mass=fits)
+    alike = recording_of(force, 24e3, height=1.0, mass=fits)
     assert "impulse against bounces" not in parts(alike.estimates["restitution"].contributions)
     assert "restitutions_differ" not in codes(alike.notes)
-    found = read(force, 24e3, height=1.0, mass=2.5)
+    found = recording_of(force, 24e3, height=1.0, mass=2.5)
     mean = found.estimates["restitution"]
     ways = [way.value for way in found.drops[0].restitutions.values()]
     apart = parts(mean.contributions)["impulse against bounces"]
@@ -146,7 +146,7 @@ def test_disagreement_of_impulse_and_bounces_is_not_averaged_away() -> None:
     assert mean.value - mean.expanded <= min(ways) < max(ways) <= mean.value + mean.expanded
     assert noted(found.notes, "restitutions_differ").others["mass"] == pytest.approx(fits, rel=1e-3)
     # A mass that is not stated is measured.
-    found = read(force, 24e3, height=1.0, calibration_uncertainty=0.01)
+    found = recording_of(force, 24e3, height=1.0, calibration_uncertainty=0.01)
     mass = found.estimates["mass"]
     assert mass.value == pytest.approx(fits, rel=1e-3)
     assert mass.uncertainty == pytest.approx(0.01 * mass.value, rel=1e-3)
@@ -383,7 +383,7 @@ class Hour:
     full_scale: float | None = None
     cells: tuple[Signal, ...] = ()
 
-    def read(self, start: int, stop: int) -> np.ndarray:
+    def recording_of(self, start: int, stop: int) -> np.ndarray:
         """Return samples, N."""
         return self.part[np.arange(start, stop) % len(self.part)].astype(np.float64)
 

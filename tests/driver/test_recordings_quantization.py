@@ -3,30 +3,23 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from conftest import codes, noted
-from synthetic import cut_drops, half_sine
+from synthetic import half_sine, only_section, parts, recording_of
 
 import thud
 from thud.level.levels import force_exposure_levels
-from thud.recordings.config import Config
 from thud.recordings.contact import band_noise
 from thud.recordings.drops import Quantization, Section
-from thud.recordings.measured_drop import GRAVITY, measure_stages
-from thud.recordings.quantities import drop_estimates
-from thud.recordings.recording import read_recording
+from thud.recordings.measured_drop import GRAVITY
 from thud.recordings.repair import find_quantization
 from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
-
-    from thud.recordings.measured_drop import Drop
-    from thud.recordings.recording import Recording
 
 RATE = 48_000.0
 PEAK, DURATION = 1500.0, 0.02
@@ -35,36 +28,30 @@ RESTITUTION = 0.75
 IMPULSE = 2 * PEAK * DURATION / np.pi
 ABOVE = DURATION * (1 - 2 * np.arcsin(0.01) / np.pi)
 MASS = IMPULSE / (SPEED * (1 + RESTITUTION) + GRAVITY * ABOVE)
+# The step of 8 bit on 2 kN.
+COARSE = 15.625
 
 
-def record(
-    step: float, noise: float, seed: int, *, count: int = 1, rate: float = RATE
-) -> NDArray[np.float64]:
+def record(step: float, noise: float, seed: int, count: int = 1) -> NDArray[np.float64]:
     """Return half sines on an offset, with noise, rounded to a step, N."""
     rng = np.random.default_rng(seed)
-    length = round((0.2 + 1.5 * count) * rate)
+    length = round((0.2 + 1.5 * count) * RATE)
     force = rng.uniform(-50, 50) + rng.normal(scale=noise, size=length)
     for k in range(count):
-        force += half_sine(rate, 0.1 + 1.5 * k + rng.uniform(0, 1e-3), length, PEAK, DURATION)
+        force += half_sine(RATE, 0.1 + 1.5 * k + rng.uniform(0, 1e-3), length, PEAK, DURATION)
     return np.rint(force / step) * step
 
 
-def measured(force: NDArray[np.float64], rate: float = RATE) -> Recording:
-    config = Config(
-        mass=MASS, height=1.0, mass_uncertainty=0, height_uncertainty=0, calibration_uncertainty=0
+def measured(force: NDArray[np.float64]) -> thud.Recording:
+    stated = dict.fromkeys(
+        ("mass_uncertainty", "height_uncertainty", "calibration_uncertainty"), 0.0
     )
-    return read_recording([Signal.from_array(force, rate, "scope")], config=config)
-
-
-def one_drop(force: NDArray[np.float64]) -> Drop:
-    (section,) = cut_drops(Signal.from_array(force, RATE, "scope"))
-    return measure_stages(section, Config(height=1.0, mass=MASS)).drop
+    return recording_of(force, RATE, mass=MASS, height=1.0, **stated)
 
 
 def quantized(force: NDArray[np.float64]) -> Quantization:
     """Return what is found in the only drop of a record."""
-    (section,) = cut_drops(Signal.from_array(force, RATE))
-    return find_quantization(section)
+    return find_quantization(only_section(force, RATE))
 
 
 def offset(background: NDArray[np.float64]) -> float:
@@ -130,53 +117,52 @@ def test_offset_lies_within_its_deviation() -> None:
 
 
 def test_noise_that_covers_the_step_needs_no_budget() -> None:
-    drop = one_drop(record(15.625, 12.0, 3))
-    assert quantized(record(15.625, 12.0, 3)).offset == 0.0
+    force = record(COARSE, 12.0, 3)
+    (drop,) = measured(force).drops
+    assert quantized(force).offset == 0.0
     assert not len(drop.contact.quantization_errors)
     assert not band_noise([drop], thud.get_bands())[:, :, 2].any()
     assert "coarse_steps" not in codes(drop.notes)
 
 
 def test_coarse_record_has_its_budget() -> None:
-    recording = measured(record(15.625, 0.5, 4, count=3))
-    assert noted(recording.drops[0].notes, "coarse_steps").others["step"] == pytest.approx(
-        15.6, abs=0.05
-    )
+    single, recording = (measured(record(COARSE, 0.5, 4, count)) for count in (1, 3))
+    steps = noted(recording.drops[0].notes, "coarse_steps").others["step"]
+    assert steps == pytest.approx(COARSE, abs=0.05)
     for estimate in recording.level_estimates():
-        part = next(part for part in estimate.contributions if part.name == "quantization")
+        (part,) = (part for part in estimate.contributions if part.name == "quantization")
         assert part.counted
         assert part.freedom == math.inf
     # The drops share the error of the offset, which does not average out.
-    single = measured(record(15.625, 0.5, 4))
-    parts = [
-        next(p.uncertainty for p in r.estimates["restitution"].contributions if "quant" in p.name)
-        for r in (single, recording)
-    ]
-    assert parts[1] == pytest.approx(parts[0], rel=0.1)
-    offset = 15.625 / math.sqrt(12) * ABOVE / (MASS * SPEED)
-    assert parts[0] == pytest.approx(offset, rel=0.25)
-
-
-def test_effective_mass_has_the_quantization_of_the_impulse() -> None:
-    force = record(15.625, 0.5, 4)
-    force[40_000:] += np.rint(half_sine(RATE, 0.05, force.size - 40_000) / 20) * 15.625
-    drop = one_drop(force)
-    mass = drop_estimates([drop], Config(height=1.0), None)["effective_mass"]
-    (part,) = (part for part in mass.contributions if part.name == "quantization")
+    alone, shared = (
+        parts(one.estimates["restitution"].contributions)["quantization"]
+        for one in (single, recording)
+    )
+    assert shared == pytest.approx(alone, rel=0.1)
+    error = COARSE / math.sqrt(12) * ABOVE
+    assert alone == pytest.approx(error / (MASS * SPEED), rel=0.25)
     # The error of the offset over the contact; that of its samples averages out.
+    (drop,) = single.drops
     impulse = drop.contact.background.quantization.offset * drop.contact_time.value
     errors = drop.contact.quantization_errors.sum(axis=1) / drop.sample_rate
     assert errors.std() == pytest.approx(impulse, rel=0.03)
-    relative = impulse / drop.impulse.value
-    assert part.uncertainty == pytest.approx(mass.value * relative)
+
+
+def test_effective_mass_has_the_quantization_of_the_impulse() -> None:
+    force = record(COARSE, 0.5, 4)
+    force[40_000:] += np.rint(half_sine(RATE, 0.05, force.size - 40_000) / 20) * COARSE
+    recording = measured(force)
+    (drop,), mass = recording.drops, recording.estimates["effective_mass"]
+    impulse = drop.contact.background.quantization.offset * drop.contact_time.value
+    found = parts(mass.contributions)["quantization"]
+    assert found == pytest.approx(mass.value * impulse / drop.impulse.value)
 
 
 def test_constant_background_next_to_a_steep_flank_is_not_lost() -> None:
-    time = np.arange(2400) / 8000 - 0.1
-    x = np.clip(time / DURATION, 0, 1)
-    force = np.rint(PEAK * np.sin(np.pi * x**0.8) / 15.625) * 15.625
-    (window,) = cut_drops(Signal.from_array(force, 8000.0))
-    assert measure_stages(window, Config()).drop.contact_time.value == pytest.approx(0.02, rel=0.05)
+    x = np.clip((np.arange(2400) / 8000 - 0.1) / DURATION, 0, 1)
+    force = np.rint(PEAK * np.sin(np.pi * x**0.8) / COARSE) * COARSE
+    (drop,) = recording_of(force, 8000.0).drops
+    assert drop.contact_time.value == pytest.approx(0.02, rel=0.05)
 
 
 def test_bounce_of_a_step_has_a_touch() -> None:
@@ -188,10 +174,10 @@ def test_bounce_of_a_step_has_a_touch() -> None:
 
 
 def test_load_cells_add_their_steps() -> None:
-    cells = [Signal.from_array(record(step, 0.01, 1), RATE, "F") for step in (5.0, 12.0)]
-    (window,) = cut_drops(replace(cells[0], cells=tuple(cells)))
-    alone = [find_quantization(cell) for cell in window.cells]
-    both = find_quantization(window)
+    forces = [record(step, 0.01, 1) for step in (5.0, 12.0)]
+    cells = tuple(Signal.from_array(force, RATE, "F") for force in forces)
+    window = only_section(forces[0], RATE, cells=cells)
+    both, *alone = (find_quantization(part) for part in (window, *window.cells))
     assert both.step == pytest.approx(12.0)
     assert both.offset == pytest.approx(math.hypot(*(one.offset for one in alone)))
     assert both.density == pytest.approx(sum(one.density for one in alone))

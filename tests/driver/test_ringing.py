@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from conftest import REPOSITORY, codes
-from synthetic import coloured_noise, make_drop, read
+from synthetic import coloured_noise, make_drop, recording_of
 
 import thud
 from thud.recordings.config import read_config
@@ -29,7 +29,9 @@ def test_clean_record_does_not_ring() -> None:
     force = np.pad(impact.floor_force, int(0.1 * RATE))
     for colour in ("white", "pink", "brown"):
         noise = coloured_noise(len(force), RATE, 2.0, colour, np.random.default_rng(1))
-        assert "plate_rings" not in codes(read(force + noise, RATE, height=1.0, mass=2.5).notes)
+        assert "plate_rings" not in codes(
+            recording_of(force + noise, RATE, height=1.0, mass=2.5).notes
+        )
 
 
 def test_plate_that_is_stated_wrongly_rings_on() -> None:
