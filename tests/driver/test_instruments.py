@@ -221,7 +221,11 @@ def test_peak_has_the_uncertainty_of_instruments_that_are_not_stated() -> None:
     assert change < np.sqrt(doubted.uncertainty**2 - known.uncertainty**2) < 2 * change
 
 
-def test_noise_of_the_examples_ends_at_half_the_rate() -> None:
+def test_noise_that_ends_below_half_the_rate_is_that_of_a_filter() -> None:
+    noisy = PULSE + np.random.default_rng(1).normal(scale=0.5, size=len(PULSE))
+    filtered = felt(noisy, RATE, RecorderFilter("bessel", 4, 5000.0))
+    found = recording_of(filtered, RATE, plate=FLAT["plate"])
+    assert noted(found.notes, "noise_ends").value == pytest.approx(5000, rel=0.25)
     # With hum, drift and a plate that rings.
     found = thud.read_recording(f"inputs/recordings/drop_{i}.csv" for i in (1, 2, 3))
     assert "noise_ends" not in codes(found.notes)

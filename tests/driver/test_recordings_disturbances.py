@@ -136,6 +136,7 @@ def truth() -> thud.Recording:
         row("tremor", wave(6, 20), []),
         row("droop of 0.2 s", droop(0.2), []),
         row("droop of 2 s", droop(2.0), []),
+        row("constant before", -NOISE * (TIME < -0.15), [{"code": "constant_background"}]),
         row("held samples beside a tone", held(), [{"code": "jump"}, tone(450, 3)], NONE),
     ],
 )

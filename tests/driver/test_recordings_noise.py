@@ -79,19 +79,6 @@ def test_covariances_are_means_over_cells(brown: bool) -> None:  # noqa: FBT001
         assert found[i, k] == pytest.approx(mean_of_lags(one, other, brown), rel=1e-7)
 
 
-def test_covariances_belong_to_spectra_of_density_1() -> None:
-    """Differences of autocovariances are integrals of S(f) (cos(2 pi f t1) - cos(2 pi f t2))."""
-    points = np.array([0.0, 0.01, 0.03])
-    cells = points, points + 1e-6
-    pink, brown = unit_covariances(cells, cells)[:2, 0, 1:]
-    f = np.linspace(1e-3, 1e4, 1_000_000)
-    change = np.cos(2 * np.pi * f * 0.01) - np.cos(2 * np.pi * f * 0.03)
-    step = f[1] - f[0]
-    # What is left above the highest frequency is less than 1/(2 pi f t) of its density.
-    assert pink[0] - pink[1] == pytest.approx((change / f).sum() * step, abs=1e-4)
-    assert brown[0] - brown[1] == pytest.approx((change / f**2).sum() * step, rel=1e-3)
-
-
 def test_hum_has_harmonics_of_random_phases_and_an_uncertain_frequency() -> None:
     found = unit_covariances(QUIET, CONTACT)[2:4]
     nodes, weights = np.polynomial.legendre.leggauss(12)
