@@ -14,11 +14,13 @@ from scipy.integrate import quad
 from synthetic import coloured_noise, make_drop, noise_density
 
 import thud
+from thud.level.levels import BANDWIDTHS
 from thud.recordings import background as module
 from thud.recordings.background import Background, fit_noise, unit_covariances
 from thud.recordings.contact import band_functionals, band_noise
 
 if TYPE_CHECKING:
+    from thud.base._schema import BandSet
     from thud.recordings.background import Cells
 
 # Of docs/recordings_theory.md, section 2.
@@ -239,15 +241,15 @@ def test_fitted_density_is_that_of_the_noise(colour: str) -> None:
 
 
 @pytest.mark.parametrize("rate", [2500.0, 25600.0])
-def test_functionals_have_the_energy_of_a_band(rate: float) -> None:
-    force = np.random.default_rng(1).normal(size=int(0.02 * rate))
-    bands = thud.get_bands()
+@pytest.mark.parametrize("bands", BANDWIDTHS)
+def test_functionals_have_the_energy_of_a_band(rate: float, bands: BandSet) -> None:
+    force, edges = np.random.default_rng(1).normal(size=int(0.02 * rate)), thud.get_bands(bands)
     energies = [
         np.sum((band_functionals(len(force), rate, *edge) @ force) ** 2)
-        for edge in zip(bands.lower, bands.upper, strict=True)
+        for edge in zip(edges.lower, edges.upper, strict=True)
     ]
     np.testing.assert_allclose(
-        10 * np.log10(energies), thud.force_exposure_levels(force, rate), atol=1e-6
+        10 * np.log10(energies), thud.force_exposure_levels(force, rate, bands), atol=1e-6
     )
 
 
