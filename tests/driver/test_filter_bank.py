@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from scipy.signal import butter, freqz_sos
+from synthetic import half_sine
 
 import thud
 from thud.level.levels import BANDWIDTHS
@@ -25,6 +26,7 @@ PASS = ([0, 1 / 8, 1 / 4, 3 / 8, 1 / 2], [0.4, 0.5, 0.7, 1.4, 5.3])
 STOP = ([1 / 2, 1, 2, 3, 4], [1.2, 16.6, 40.5, 60, 70])
 RIPPLE = 0.4
 BANDWIDTH = 0.4
+EFFECTIVE = "effective bandwidth of the filters (IEC 61260-1 class 1)"
 
 
 def breakpoints(exponents: list[float], fraction: int) -> np.ndarray:
@@ -70,9 +72,8 @@ def effective_bandwidth(sections: np.ndarray, lower: float, upper: float, rate: 
     return float(10 * np.log10(width / (upper - lower)))
 
 
-def half_sine(rate: float) -> np.ndarray:
-    time = np.arange(int(0.02 * rate) + 1) / rate
-    return 1500 * np.sin(np.pi * time / 0.02)
+def pulse(rate: float) -> np.ndarray:
+    return half_sine(rate, 0.0, int(0.02 * rate) + 1)
 
 
 @pytest.mark.parametrize("bands", BANDWIDTHS)
@@ -89,13 +90,7 @@ def test_each_filter_lies_inside_the_mask_of_class_1(
         # narrows the skirts.
         width = effective_bandwidth(sections, lower, upper, rate)
         assert 0.18 < width < 0.2004
-        oracle(
-            "effective bandwidth of the filters (IEC 61260-1 class 1)",
-            "standard",
-            width,
-            BANDWIDTH,
-            "dB",
-        )
+        oracle(EFFECTIVE, "standard", width, BANDWIDTH, "dB")
 
 
 @pytest.mark.parametrize("bands", BANDWIDTHS)
@@ -111,7 +106,7 @@ def test_low_rates_are_filtered_inside_the_mask_too(bands: str, rate: float) -> 
         for sections, center in zip(own, edges.center, strict=True):
             if not np.isnan(sections).any():
                 assert mask_margin(sections, center, FRACTION[bands], rated) > 0
-    assert np.isfinite(filter_levels(half_sine(rate), rate, bands)).all()
+    assert np.isfinite(filter_levels(pulse(rate), rate, bands)).all()
 
 
 def test_filter_of_order_2_or_at_a_low_rate_misses_the_mask() -> None:
@@ -145,7 +140,7 @@ def test_sections_keep_their_attenuation_without_decimation(rate: float) -> None
 @pytest.mark.slow
 def test_ringing_is_padded_and_low_rates_are_interpolated(bands: str, rate: int) -> None:
     """Time domain against frequency domain: integral of abs(H F)**2."""
-    force, edges = half_sine(rate), thud.get_bands(bands)
+    force, edges = pulse(rate), thud.get_bands(bands)
     inside = edges.upper < rate / 2
     filtered = rate * max(1, int(np.ceil(4 * edges.upper[inside].max() / rate)))
     length = 2**20

@@ -158,9 +158,7 @@ def test_edges_of_flanks_are_where_their_force_passes_a_percent(
 ) -> None:
     """Lines, points of contact, feet, jumps, and rises to half the peak within a millisecond."""
     x = np.arange(int(0.02 * 16 * RATE)) / (0.02 * 16 * RATE)
-    pulse = np.sin(np.pi * x) ** power + jump
-    if steep:
-        pulse = (1 - x) * (1 - np.exp(-steep * x))
+    pulse = (1 - x) * (1 - np.exp(-steep * x)) if steep else np.sin(np.pi * x) ** power + jump
     for error, uncertainty in edge_errors(1500 * pulse / pulse.max(), 0.5, 1):
         assert abs(error) < min(3 * uncertainty, 4e-5)
         assert uncertainty < 6e-5

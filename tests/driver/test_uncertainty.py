@@ -43,13 +43,10 @@ def test_small_tolerances_propagate_linearly(small: Uncertainty, shell: thud.Imp
     variance = np.zeros(5)
     for name, deviation in spread.items():
         above, below = (
-            thud.solve(
-                thud.Ball(**{name: getattr(standard, name) + side * deviation}),
-                model="hollow_sphere",
-            ).levels()
-            for side in (1, -1)
+            thud.solve(thud.Ball(**{name: getattr(standard, name) + change}), model="hollow_sphere")
+            for change in (deviation, -deviation)
         )
-        variance += ((above - below) / 2) ** 2
+        variance += ((above.levels() - below.levels()) / 2) ** 2
     # The deviation of n samples errs by 1 / sqrt(2 n); four of these.
     chance = 4 / np.sqrt(2 * SIZE)
     np.testing.assert_allclose(small.levels.std(axis=0, ddof=1), np.sqrt(variance), rtol=chance)
@@ -60,14 +57,12 @@ def test_small_tolerances_propagate_linearly(small: Uncertainty, shell: thud.Imp
 @pytest.mark.slow
 def test_probability_of_a_criterion_that_is_known() -> None:
     # This ball has 0.2 dB to spare; the height conforms from 0.99 to 1.01 m.
-    result = thud.uncertainty(
-        {
-            "case": str(REPOSITORY / "inputs/rubber_ball_modal.nml"),
-            "fixed": {"loss_factor": 0.2, "wall_thickness": 0.0306, "youngs_modulus": 1.8e6},
-            "design": {"size": 100, "seed": 5},
-            "parameters": {"height": {"low": 98, "high": 102, "unit": "cm"}},
-        }
-    )
+    result = thud.uncertainty({
+        "case": str(REPOSITORY / "inputs/rubber_ball_modal.nml"),
+        "fixed": {"loss_factor": 0.2, "wall_thickness": 0.0306, "youngs_modulus": 1.8e6},
+        "design": {"size": 100, "seed": 5},
+        "parameters": {"height": {"low": 98, "high": 102, "unit": "cm"}},
+    })  # fmt: skip
     height = result.dataset["height"].values
     assert result.conforming == np.sum((height >= 0.99) & (height <= 1.01))
     assert result.probability == result.conforming / 100
