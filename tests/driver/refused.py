@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from synthetic import half_sine, make_recording, only_section, recording_of, uncertain_contact
+from synthetic import half_sines, only_section, recording_of, uncertain_contact
 
 import thud
 from thud.level.levels import peak_count
@@ -25,8 +25,9 @@ if TYPE_CHECKING:
 
 # What is only imported for the table.
 __all__ = [
-    "Config", "Signal", "band_filters", "filter_levels", "find_drops", "inf", "measure_drop", "nan",
-    "np", "only_section", "peak_count", "recording_of", "repair", "uncertain_contact",
+    "Config", "Signal", "band_filters", "filter_levels", "find_drops", "half_sines", "inf",
+    "measure_drop", "nan", "np", "only_section", "peak_count", "recording_of", "repair",
+    "uncertain_contact",
 ]  # fmt: skip
 
 PULSE = np.sin(np.pi * np.linspace(0, 1, 883))
@@ -52,11 +53,10 @@ def assess(**change: Any) -> thud.Verdict:  # noqa: ANN401
     return thud.assess_levels(**({"levels": [39, 31, 23, 17, 12.5]} | change))
 
 
-def half_sines(*drops: tuple[float, float], lost: int = 0) -> NDArray[np.float64]:
-    """Return the force of half-sines of 20 ms at 48 kHz; at 8 ms, some samples are zero."""
-    pulse = half_sine(192e3, 0.0, 3842)
-    force, _ = make_recording(pulse, 192e3, rate=48e3, noise_db=60, drops=((0.0, 1.0), *drops))
-    force[5200 : 5200 + lost] = 0.0
+def lost(count: int) -> NDArray[np.float64]:
+    """Return the force of a drop of which some samples at 8 ms are zero."""
+    force = half_sines(48e3, 60)
+    force[5200 : 5200 + count] = 0.0
     return force
 
 

@@ -134,6 +134,25 @@ def make_recording(  # noqa: PLR0913 - each is one fault
     return recording, clean
 
 
+# A half-sine of 1500 N and 20 ms, N, its rate, Hz, and the closed form of its levels, dB.
+FINE = 192e3
+HALF_SINE = half_sine(FINE, 0.0, 3842)
+LEVELS = np.array([38.3125, 30.6046, 19.2578, 8.9323, -0.4390])
+
+
+def half_sines(
+    rate: float,
+    noise_db: float,
+    *drops: tuple[float, float],
+    **options: Any,  # noqa: ANN401
+) -> np.ndarray:
+    """Return a recording of a half-sine and further ones, N; see `make_recording`."""
+    several = ((0.0, 1.0), *drops)
+    return make_recording(HALF_SINE, FINE, rate=rate, noise_db=noise_db, drops=several, **options)[
+        0
+    ]
+
+
 def make_drop(  # noqa: PLR0913 - what a recording may be
     deviation: float = 0.0,
     rate: float = 25600.0,

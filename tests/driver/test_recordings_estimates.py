@@ -10,9 +10,13 @@ import pytest
 from conftest import codes, noted
 from scipy.stats import chi2
 from synthetic import (
+    FINE,
+    HALF_SINE,
+    LEVELS,
     band_limited,
     cut_drops,
     half_sine,
+    half_sines,
     make_drop,
     make_recording,
     only_section,
@@ -20,7 +24,7 @@ from synthetic import (
     recording_of,
     uncertain_contact,
     with_force,
-)  # fmt: skip
+)
 
 import thud
 from thud.impact.contact_time import contact_span
@@ -33,11 +37,8 @@ from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.repair import repair
 from thud.recordings.signal import Signal
 
-ORACLE = np.array([38.3125, 30.6046, 19.2578, 8.9323, -0.4390])
-FINE = 192_000.0
 # A half sine of 20 ms is above 1 % of its peak for this time, s.
 ABOVE = 0.02 * (1 - 2 * np.arcsin(0.01) / np.pi)
-HALF_SINE = half_sine(FINE, 0.0, int(0.02 * FINE) + 2)
 SPEED = np.sqrt(2 * 9.81)
 
 
@@ -50,11 +51,9 @@ def drops(force: np.ndarray, rate: float, **stated: float | None) -> tuple[Drop,
     return recording_of(force, rate, **{"height": 1.0, "mass": 2.5} | stated).drops
 
 
-def falling(
-    flights: int, restitution: float = 0.8, scale: float = 1.0
-) -> list[tuple[float, float]]:
-    """Return times since first touch and factors of a drop and its bounces."""
-    at, part, series = 0.0, scale, [(0.0, scale)]
+def falling(flights: int, restitution: float = 0.8, part: float = 1.0) -> list[tuple[float, float]]:
+    """Return times since first touch and factors of the bounces of a drop."""
+    at, series = 0.0, []
     for _ in range(flights):
         part *= restitution
         at += 0.02 + 2 * SPEED * part / 9.81
@@ -79,9 +78,7 @@ def test_noise_of_5_n_does_not_stretch_the_contact(flagship: thud.Impact, before
 
 @pytest.mark.parametrize("gap", [0.03, 0.1, 3.0])
 def test_two_impacts_in_a_file_are_two_drops(gap: float) -> None:
-    force, _ = make_recording(
-        HALF_SINE, FINE, rate=48e3, noise_db=50, drops=((0.0, 1.0), (0.02 + gap, 1.0))
-    )
+    force = half_sines(48e3, 50, (0.02 + gap, 1.0))
     found = drops(force, 48e3)
     assert [drop.name for drop in found] == ["file.wav, drop 1", "file.wav, drop 2"]
     assert found[1].onset - found[0].onset == pytest.approx(0.02 + gap, abs=2e-4)
@@ -98,14 +95,14 @@ def test_two_impacts_in_a_file_are_two_drops(gap: float) -> None:
 def test_filtered_half_sine_has_the_levels_of_the_pulse(rate: float) -> None:
     time = np.arange(int(0.25 * rate)) / rate - 0.1003
     (drop,) = drops(band_limited(HALF_SINE, FINE, rate, time) + 20.0, rate)
-    np.testing.assert_allclose(drop.levels(), ORACLE, rtol=0, atol=1e-3)
+    np.testing.assert_allclose(drop.levels(), LEVELS, rtol=0, atol=1e-3)
 
 
 def test_bounces_are_told_from_drops() -> None:
-    second = [(6.0 + at, part) for at, part in falling(4, scale=0.99)]
-    force, _ = make_recording(HALF_SINE, FINE, rate=24e3, noise_db=50, drops=(*falling(4), *second))
+    second = [(6.0 + at, part) for at, part in ((0.0, 0.99), *falling(4, part=0.99))]
+    force = half_sines(24e3, 50, *falling(4), *second)
     for drop, part in zip(drops(force, 24e3), (1.0, 0.99), strict=True):
-        assert drop.bounce == pytest.approx(falling(1, scale=part)[1][0], abs=3e-4)
+        assert drop.bounce == pytest.approx(falling(1, part=part)[0][0], abs=3e-4)
         by = drop.restitutions["bounces"]
         assert by.value == pytest.approx(0.8 * part, abs=3e-4)
         assert abs(by.value - 0.8 * part) < 4 * by.uncertainty
@@ -130,9 +127,7 @@ def test_restitution_is_that_from_first_touch_to_release() -> None:
 
 
 def test_disagreement_of_impulse_and_bounces_is_not_averaged_away() -> None:
-    force, _ = make_recording(
-        HALF_SINE, FINE, rate=24e3, noise_db=60, drops=tuple(falling(2, 0.75))
-    )
+    force = half_sines(24e3, 60, *falling(2, 0.75))
     momentum = 1500 * 0.02 * 2 / np.pi
     fits = momentum / (1.75 * SPEED + 9.81 * 0.02)
     alike = recording_of(force, 24e3, height=1.0, mass=fits)
@@ -294,10 +289,7 @@ def test_peaks_are_not_counted_in_noise() -> None:
 
 
 def test_noise_behind_a_drop_is_not_its_bounce() -> None:
-    force, _ = make_recording(
-        HALF_SINE, FINE, rate=24e3, noise_db=60, drops=((0.0, 1.0), (0.06, 0.3)), after=0.3
-    )
-    (drop,) = drops(force, 24e3)
+    (drop,) = drops(half_sines(24e3, 60, (0.06, 0.3), after=0.3), 24e3)
     assert list(drop.restitutions) == ["impulse"]
     assert noted(drop.notes, "no_bounce").others["height"] == 1.0
 
@@ -325,7 +317,7 @@ def test_constant_top_is_clipped_where_it_changes_levels(
 
 
 def test_one_sample_at_full_scale_is_not_clipped() -> None:
-    force, _ = make_recording(HALF_SINE, FINE, rate=48e3, noise_db=60)
+    force = half_sines(48e3, 60)
     section = only_section(force, 48e3, full_scale=force.max() / 0.9990001)
     assert codes(repair(section).notes) == []
 
@@ -333,7 +325,7 @@ def test_one_sample_at_full_scale_is_not_clipped() -> None:
 @pytest.mark.parametrize("offset", [-3000.0, 0.0, 3000.0])
 def test_held_samples_jump_by_a_part_of_the_peak_above_the_quiet(offset: float) -> None:
     # Noise would exclude held samples without a jump.
-    force, _ = make_recording(HALF_SINE, FINE, rate=48e3, noise_db=110, offset=offset)
+    force = half_sines(48e3, 110, offset=offset)
     window = only_section(force, 48e3)
     first = window.start + window.contact[0] + 200
     rise = np.diff(force[first : first + 60]).mean()

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.stats import binom, norm, t as student
-from synthetic import make_drop, parts, with_force
+from synthetic import LEVELS, make_drop, parts, with_force
 
 import thud
 from thud.level.assessment import assess_levels
@@ -25,8 +25,6 @@ from thud.recordings.recorded_levels import (
     measure_levels,
 )  # fmt: skip
 
-# Half-sine of 1500 N and 20 ms: closed form of the band energies, dB.
-HALF_SINE = [38.3125, 30.6046, 19.2578, 8.9323, -0.4390]
 NOMINAL = [39.0, 31.0, 23.0, 17.0, 12.5]
 NAMES = [f"drop {i + 1}" for i in range(20)]
 
@@ -38,7 +36,7 @@ def test_half_sine_by_all_methods(rate: int) -> None:
     np.testing.assert_array_equal(found["exact"], measure_levels([drop]).level)
     # Aliases of a spectrum that falls by 12 dB per octave: 2 (f/(rate - f))**2 in amplitude.
     alias = (thud.get_bands().upper / (rate - thud.get_bands().upper)) ** 2
-    assert (np.abs(found["exact"][0] - HALF_SINE) <= 20 * np.log10(1 + 2 * alias) + 1e-3).all()
+    assert (np.abs(found["exact"][0] - LEVELS) <= 20 * np.log10(1 + 2 * alias) + 1e-3).all()
     force = drop.contact.gated
     np.testing.assert_array_equal(
         found["fft"][0], thud.force_exposure_levels(force, rate, method="fft")
