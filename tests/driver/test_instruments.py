@@ -22,7 +22,7 @@ from thud.recordings.instruments import (
     correct_force,
     instrument_uncertainties,
     mean_level_changes,
-)  # fmt: skip
+)
 
 RATE = 48_000.0
 TIME = np.arange(-4800, 9600) / RATE

@@ -23,7 +23,7 @@ from thud.recordings.recorded_levels import (
     average_levels,
     compare_methods,
     measure_levels,
-)  # fmt: skip
+)
 
 NOMINAL = [39.0, 31.0, 23.0, 17.0, 12.5]
 NAMES = [f"drop {i + 1}" for i in range(20)]
