@@ -117,17 +117,6 @@ def test_shapes_are_those_of_the_theory() -> None:
         np.testing.assert_allclose(column, expected, atol=1e-12)
 
 
-def test_tables_of_shapes_are_smoothed_and_averaged() -> None:
-    line = int(np.flatnonzero((module.POWERS == 1) & (module.JUMPS == 0))[0])
-    table, averaged = module._shapes(1e3 / RATE)  # noqa: SLF001
-    # Neither changes a line away from its kink.
-    tick = round((module.BEFORE + 7.9) / module.TICK)
-    assert table[tick, line] == pytest.approx(7.9, abs=0.02)
-    np.testing.assert_allclose(averaged[100:, line], module.DELAYS[100:], atol=2e-3)
-    # The mean over the first half of 0.1 ms.
-    assert averaged[0, line] == pytest.approx(0.025, abs=2e-3)
-
-
 def found_contact(record: np.ndarray, rate: float) -> tuple[Contact, float]:
     """Return the contact of a record with one drop, and the time at which its window begins, s."""
     section = only_section(record, rate)
