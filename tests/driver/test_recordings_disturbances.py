@@ -123,7 +123,8 @@ def truth() -> thud.Recording:
         rings("tone that begins", wave(450, 3) * AFTER, 450, 1414),
         row("tone that falls", wave(450, 3) * np.where(AFTER, 0.5, 1.0), [], NONE),
         row("tone that turns", wave(450, 3) * np.where(AFTER, -1.0, 1.0), [], NONE),
-        *(row(f"tone of {f}", wave(f, 20), []) for f in (5600, 6400, 11600)),
+        # Beyond the recorded band, where they move the edges of the contact.
+        *(row(f"tone of {f}", wave(f, 20), [], NONE) for f in (5600, 6400, 11600)),
         row("narrow noise", narrow(), []),
         *(
             rings(f"ringing {f} {q}", ringing(f, q), f, q)
@@ -155,7 +156,7 @@ def test_disturbance_is_noted_and_in_the_interval(
             assert note[key] == (value if key == "code" else pytest.approx(value, rel=0.02)), key
     for level, right in zip(recording.level_estimates(), truth.levels(), strict=True):
         assert abs(level.value - right) < (1.1 * level.expanded if limit == INTERVAL else limit)
-    for name in ("peak_force", "impulse"):
+    for name in ("contact_time", "peak_force", "impulse"):
         estimate, right = (getattr(one.drops[0], name) for one in (recording, truth))
         assert abs(estimate.value - right.value) < right.expanded + estimate.expanded or limit > 1
 
