@@ -138,19 +138,19 @@ def make_recording(  # noqa: PLR0913 - each is one fault
 FINE = 192e3
 HALF_SINE = half_sine(FINE, 0.0, 3842)
 LEVELS = np.array([38.3125, 30.6046, 19.2578, 8.9323, -0.4390])
+# It is above 1 % of its peak for this time, s.
+ABOVE = 0.02 * (1 - 2 * np.arcsin(0.01) / np.pi)
 
 
 def half_sines(
     rate: float,
     noise_db: float,
     *drops: tuple[float, float],
-    **options: Any,  # noqa: ANN401
+    **how: Any,  # noqa: ANN401
 ) -> np.ndarray:
     """Return a recording of a half-sine and further ones, N; see `make_recording`."""
     several = ((0.0, 1.0), *drops)
-    return make_recording(HALF_SINE, FINE, rate=rate, noise_db=noise_db, drops=several, **options)[
-        0
-    ]
+    return make_recording(HALF_SINE, FINE, rate=rate, noise_db=noise_db, drops=several, **how)[0]
 
 
 def make_drop(  # noqa: PLR0913 - what a recording may be
@@ -176,18 +176,14 @@ def make_drop(  # noqa: PLR0913 - what a recording may be
     touch, release = Estimate(before, 0), Estimate(before + 0.02, 0)
     force = half_sine(rate, before, len(time)) + noise
     return Drop(
-        name=f"drop {seed + 1}",
-        onset=before,
+        name=f"drop {seed + 1}", onset=before,
         contact=Contact(
             touch, release, touch, release, 0, force,
             np.zeros(len(time)), gate, offset,
             Background((np.zeros(1), np.ones(1)), np.zeros(1), variances, 1500.0), rate,
         ),
-        contact_time=Estimate(0.02, 0),
-        restitution=UNKNOWN,
-        peak_force=Estimate(1500, 0),
-        impulse=UNKNOWN,
-        effective_mass=UNKNOWN,
+        contact_time=Estimate(0.02, 0), restitution=UNKNOWN, peak_force=Estimate(1500, 0),
+        impulse=UNKNOWN, effective_mass=UNKNOWN,
     )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ import pytest
 from conftest import codes, noted
 from scipy.stats import chi2
 from synthetic import (
+    ABOVE,
     FINE,
     HALF_SINE,
     LEVELS,
@@ -37,8 +38,6 @@ from thud.recordings.recorded_levels import measure_levels
 from thud.recordings.repair import repair
 from thud.recordings.signal import Signal
 
-# A half sine of 20 ms is above 1 % of its peak for this time, s.
-ABOVE = 0.02 * (1 - 2 * np.arcsin(0.01) / np.pi)
 SPEED = np.sqrt(2 * 9.81)
 
 

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from conftest import codes, noted
-from synthetic import half_sine, only_section, parts, recording_of
+from synthetic import ABOVE, LEVELS, half_sine, only_section, parts, recording_of
 
 import thud
-from thud.level.levels import force_exposure_levels
 from thud.recordings.contact import band_noise
 from thud.recordings.drops import Quantization, Section
 from thud.recordings.measured_drop import GRAVITY
@@ -22,12 +21,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 RATE = 48_000.0
-PEAK, DURATION = 1500.0, 0.02
-SPEED = math.sqrt(2 * GRAVITY)
-RESTITUTION = 0.75
-IMPULSE = 2 * PEAK * DURATION / np.pi
-ABOVE = DURATION * (1 - 2 * np.arcsin(0.01) / np.pi)
-MASS = IMPULSE / (SPEED * (1 + RESTITUTION) + GRAVITY * ABOVE)
+SPEED, RESTITUTION = math.sqrt(2 * GRAVITY), 0.75
+MASS = 2 * 1500 * 0.02 / np.pi / (SPEED * (1 + RESTITUTION) + GRAVITY * ABOVE)
+EXACT = dict.fromkeys(("mass_uncertainty", "height_uncertainty", "calibration_uncertainty"), 0.0)
 # The step of 8 bit on 2 kN.
 COARSE = 15.625
 
@@ -38,15 +34,12 @@ def record(step: float, noise: float, seed: int, count: int = 1) -> NDArray[np.f
     length = round((0.2 + 1.5 * count) * RATE)
     force = rng.uniform(-50, 50) + rng.normal(scale=noise, size=length)
     for k in range(count):
-        force += half_sine(RATE, 0.1 + 1.5 * k + rng.uniform(0, 1e-3), length, PEAK, DURATION)
+        force += half_sine(RATE, 0.1 + 1.5 * k + rng.uniform(0, 1e-3), length)
     return np.rint(force / step) * step
 
 
 def measured(force: NDArray[np.float64]) -> thud.Recording:
-    stated = dict.fromkeys(
-        ("mass_uncertainty", "height_uncertainty", "calibration_uncertainty"), 0.0
-    )
-    return recording_of(force, RATE, mass=MASS, height=1.0, **stated)
+    return recording_of(force, RATE, mass=MASS, height=1.0, **EXACT)
 
 
 def quantized(force: NDArray[np.float64]) -> Quantization:
@@ -159,16 +152,16 @@ def test_effective_mass_has_the_quantization_of_the_impulse() -> None:
 
 
 def test_constant_background_next_to_a_steep_flank_is_not_lost() -> None:
-    x = np.clip((np.arange(2400) / 8000 - 0.1) / DURATION, 0, 1)
-    force = np.rint(PEAK * np.sin(np.pi * x**0.8) / COARSE) * COARSE
+    x = np.clip((np.arange(2400) / 8000 - 0.1) / 0.02, 0, 1)
+    force = np.rint(1500 * np.sin(np.pi * x**0.8) / COARSE) * COARSE
     (drop,) = recording_of(force, 8000.0).drops
     assert drop.contact_time.value == pytest.approx(0.02, rel=0.05)
 
 
 def test_bounce_of_a_step_has_a_touch() -> None:
     length = round(1.4 * RATE)
-    force = half_sine(RATE, 0.1, length, PEAK, DURATION)
-    force += half_sine(RATE, 0.7, length, 500.0, DURATION)
+    force = half_sine(RATE, 0.1, length)
+    force += half_sine(RATE, 0.7, length, 500.0)
     (drop,) = measured(375 * np.rint(force / 375)).drops
     assert drop.bounce == pytest.approx(0.6, abs=0.005)
 
@@ -189,14 +182,12 @@ def test_load_cells_add_their_steps() -> None:
 def test_quantities_lie_in_their_intervals(bits: int, scale: float, noise: float) -> None:
     # Noise in steps; no step needs more than 0.5 N of noise to be found.
     step = 2 * scale / 2**bits
-    fine = half_sine(1e6, 1e-3, 22_000, PEAK, DURATION)
-    levels = force_exposure_levels(fine, 1e6)
     inside = []
     for seed in range(20):
         recording = measured(record(step, max(noise * step, 0.05), seed))
         errors = [
             (abs(estimate.value - level), estimate.expanded)
-            for estimate, level in zip(recording.level_estimates(), levels, strict=True)
+            for estimate, level in zip(recording.level_estimates(), LEVELS, strict=True)
             if not estimate.upper_bound
         ]
         for name, value in (("contact_time", ABOVE), ("restitution", RESTITUTION)):
