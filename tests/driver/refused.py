@@ -2,38 +2,30 @@
 
 from __future__ import annotations
 
+import shlex
+import subprocess
+import sysconfig
+from concurrent.futures import ThreadPoolExecutor
 from math import inf, nan
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
-from synthetic import half_sines, only_section, recording_of, uncertain_contact
 
 import thud
 from thud.level.levels import peak_count
-from thud.recordings.config import Config
-from thud.recordings.drops import find_drops
-from thud.recordings.filters import band_filters, filter_levels
-from thud.recordings.formats.text import read_table
-from thud.recordings.measured_drop import measure_drop
-from thud.recordings.repair import repair
-from thud.recordings.signal import Signal
-from thud.studies.fitting.record import read_record, time_and_force
+from thud.studies.run import evaluate
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 # What is only imported for the table.
-__all__ = [
-    "Config", "Signal", "band_filters", "filter_levels", "find_drops", "half_sines", "inf",
-    "measure_drop", "nan", "np", "only_section", "peak_count", "recording_of", "repair",
-    "uncertain_contact",
-]  # fmt: skip
+__all__ = ["ThreadPoolExecutor", "evaluate", "inf", "nan", "np", "peak_count"]
 
 PULSE = np.sin(np.pi * np.linspace(0, 1, 883))
-TIMES = 0.2 + np.arange(500) / 44100
-SHELL = thud.solve(duration=0.03)
-NOISE = np.random.default_rng(1).normal(size=1323)
+SHELL = "&model name = 'hollow_sphere' /"
+LARGE = {"low": 1, "high": 2, "count": 257}
+HEIGHTS = {"parameters": {"height": {"values": [0.5, 1.0]}}}
 
 
 def write(name: str, text: str | bytes) -> Path:
@@ -53,27 +45,31 @@ def assess(**change: Any) -> thud.Verdict:  # noqa: ANN401
     return thud.assess_levels(**({"levels": [39, 31, 23, 17, 12.5]} | change))
 
 
-def lost(count: int) -> NDArray[np.float64]:
-    """Return the force of a drop of which some samples at 8 ms are zero."""
-    force = half_sines(48e3, 60)
-    force[5200 : 5200 + count] = 0.0
-    return force
+def study(tables: str | bytes, varied: str = "height.values = [1]") -> thud.Study:
+    """Read the file of a study with varied parameters."""
+    head = tables if isinstance(tables, bytes) else tables.encode()
+    entry = f"parameters = {varied}" if varied.startswith("{") else f"parameters.{varied}"
+    return thud.read_study(write("study.toml", head + b"\n" + entry.encode()))
 
 
-def read_force(source: str | list[ArrayLike]) -> object:
-    """Return a record of times and forces, or of the text of a file."""
-    if isinstance(source, list):
-        return read_record(np.column_stack(source))
-    return read_record(time_and_force(read_table(write("plate.csv", source))), "plate.csv")
+def heated(law: str, model: str = "modal_ball", more: str = "") -> thud.Study:
+    """Read the file of a study in which the temperature varies."""
+    tables = f"fixed.model = {model!r}\ntemperature = {{{law}}}"
+    return study(tables, f"temperature.values = [1]\n{more and f'parameters.{more}'}")
 
 
-def number_table(last: str, form: str = "{};{}") -> object:
-    """Read eight rows of integers, which decide no decimal mark, and a last one."""
-    rows = [form.format(i, i % 3) for i in range(8)]
-    return read_table(write("plate.csv", "\n".join([*rows, last]) + "\n"))
+def many(parameters: Any = None, **options: Any) -> thud.Ensemble:  # noqa: ANN401
+    """Solve samples."""
+    return thud.solve_many({} if parameters is None else parameters, **options)
 
 
-def named(*names: str) -> str:
-    """Write cases of these names; return their files."""
-    case = "&case name = '{}' /\n&ball /\n&drop /\n&model name = 'hollow_sphere' /\n"
-    return " ".join(str(write(f"{i}.nml", case.format(name))) for i, name in enumerate(names))
+def samples(table: str = "height\n1\n", case: str = SHELL, arguments: str = "") -> NoReturn:
+    """Run the executable with a table of samples that is refused; raise what it says."""
+    write("table.csv", table)
+    write("ball.nml", f"&ball / &drop / {case}")
+    executable = Path(sysconfig.get_path("scripts")) / "thud"
+    command = [executable, "ball.nml", *shlex.split(arguments or "--samples table.csv")]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert result.returncode == 1
+    assert not Path("outputs/ball_samples").exists()
+    raise thud.InputError(result.stderr.splitlines()[0] if arguments else result.stderr.strip())

@@ -3,136 +3,137 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 import xarray as xr
 from conftest import naming
-from scipy.stats import norm
+from hypothesis import given, settings, strategies as st
+from scipy.stats import loguniform, norm, uniform
 
 import thud
-from thud.base._schema import KEYS
+from thud.base.units import SIZES
+from thud.case.keys import known_keys
 from thud.studies import sampling
 from thud.studies.design import Design
-from thud.studies.parameter import MAX_VALUES, Parameter, read_varied
+from thud.studies.parameter import MAX_VALUES
 from thud.studies.sensitivity import sobol_indices
-from thud.studies.study import read_design
-from thud.studies.temperature import Temperature, read_temperature
 from thud.studies.uncertainty import Uncertainty
 
-CASE = thud.Case()
-REAL = next(key for key in KEYS if (key.group, key.name) == ("drop", "height"))
-WHOLE = next(key for key in KEYS if (key.group, key.name) == ("modal_ball", "rings"))
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike, NDArray
+
+    from thud.base.key import Key
+
+DESIGNS = ("random", "latin_hypercube", "sobol")
+
+# Keys that may vary in any study: numbers, words and flags.
+VARIED = [
+    key
+    for key in known_keys(thud.Case()).values()
+    if key.kind in {"real", "whole", "choice", "flag"} and key.name not in {"bands", "temperature"}
+]
 
 
-def real(**words: Any) -> Parameter:  # noqa: ANN401 - of any kind
-    return Parameter(**words, name=REAL.name, key=REAL)
+@st.composite
+def parameters(draw: st.DrawFn) -> tuple[Key, dict[str, Any], float]:
+    """Return a key, a table of its values, and the size of its unit in that of the key."""
+    key = draw(st.sampled_from(VARIED))
+    kinds: dict[str, st.SearchStrategy[Any]] = {
+        "real": st.floats(1e-3, 1e3), "whole": st.integers(1, 1000), "flag": st.booleans(),
+        "choice": st.sampled_from(key.choices or ("",)),
+    }  # fmt: skip
+    value, table = kinds[key.kind], dict[str, Any]()
+    forms = ["values", "low", "std"][: {"real": 3, "whole": 2}.get(key.kind, 1)]
+    form = draw(st.sampled_from(forms))
+    if form == "values":
+        table["values"] = draw(st.lists(value, min_size=1, max_size=5))
+    elif form == "low":
+        ends = draw(st.lists(value, min_size=2, max_size=2, unique=True))
+        table = {
+            "low": min(ends),
+            "high": max(ends),
+            "scale": draw(st.sampled_from(["linear", "log"])),
+        }
+    else:
+        table = {"std": draw(value), "mean": draw(value)}
+    if key.kind != "real":
+        return key, table, 1
+    sizes = SIZES.get(key.unit, {key.unit: 1.0})
+    decimal = [unit for unit, size in sizes.items() if round(np.log10(size), 9).is_integer()]
+    table["unit"] = draw(st.sampled_from(decimal))
+    return key, table, sizes[table["unit"]]
 
 
-def whole(**words: Any) -> Parameter:  # noqa: ANN401 - of any kind
-    return Parameter(**words, name=WHOLE.name, key=WHOLE)
+def quantiles(key: Key, table: dict[str, Any], fraction: NDArray[np.float64]) -> ArrayLike:
+    """Return the values below which fractions of the distribution lie, in the unit of the table."""
+    if values := table.get("values"):
+        return [values[int(share * len(values))] for share in fraction]
+    if "std" in table:
+        return np.asarray(norm.ppf(fraction, table["mean"], table["std"]))
+    # A whole number has the probability of the interval up to the next one.
+    whole = key.kind == "whole"
+    low, high = table["low"], table["high"] + whole
+    even = uniform(low, high - low) if table["scale"] == "linear" else loguniform(low, high)
+    result = even.ppf(fraction)
+    return np.floor(result) if whole else result
 
 
-def test_quantiles_are_the_inverse_of_their_distributions() -> None:
-    share = np.array([0.0, 0.1, 0.25, 0.5, 0.9, 0.999])
-    assert real(low=2.0, high=6.0).quantiles(share) == pytest.approx(2 + 4 * share)
-    logarithmic = real(low=2.0, high=32.0, scale="log").quantiles(share)
-    assert np.log2(logarithmic) == pytest.approx(1 + 4 * share)
-    normal = real(mean=5.0, std=0.5).quantiles(share)
-    assert norm.cdf(normal[1:], 5, 0.5) == pytest.approx(share[1:])
-    assert 5 - 0.5 * 9 < normal[0] < 5 - 0.5 * 8
-    assert real(values=(7, 8, 9, 5)).quantiles(share).tolist() == [7, 7, 8, 9, 5, 5]
-    # Each whole number has the share up to the next; of logarithms its own.
-    found = whole(low=10, high=12).quantiles(np.array([0, 0.33, 0.34, 0.66, 0.67, 0.9999]))
-    assert found.tolist() == [10, 10, 11, 11, 12, 12]
-    edges = np.log(np.array([3, 4]) / 2) / np.log(2)
-    found = whole(low=2, high=3, scale="log").quantiles(np.append(edges[0] + [-1e-9, 1e-9], 1.0))
-    assert found.tolist() == [2, 3, 3]
+@given(parameter=parameters(), design=st.sampled_from(DESIGNS), seed=st.integers(0, 2**32 - 1))
+@settings(deadline=None)
+def test_study_has_the_values_that_it_states(
+    parameter: tuple[Key, dict[str, Any], float], design: str, seed: int
+) -> None:
+    key, table, size = parameter
+    tables = {"design": {"kind": design, "size": 32, "seed": seed}}
+    study = thud.read_study({**tables, "parameters": {key.name: table}})
+    found = study.parameter_columns(0, 32)[key.name]
+    expected = quantiles(key, table, sampling.unit_samples(design, 1, 32, seed)[:, 0])
+    if key.kind in {"real", "whole"}:
+        np.testing.assert_allclose(found, size * np.asarray(expected), rtol=1e-9)
+    else:
+        assert found.tolist() == expected
+    of_python = {key.name: thud.Parameter(**table)}
+    assert thud.read_study({**tables, "parameters": of_python}).identity == study.identity
 
 
-def test_grids_have_their_ends_and_count() -> None:
-    assert real(low=1.0, high=3.0, count=5).grid().tolist() == [1, 1.5, 2, 2.5, 3]
-    assert real(low=1.0, high=4.0, count=3, scale="log").grid() == pytest.approx([1, 2, 4])
-    assert real(values=(3, 1, 2)).grid().tolist() == [3, 1, 2]
-    assert real().grid().size == 0
-    assert whole(low=1, high=4, count=3).grid().tolist() == [1, 2, 4]
-    # Whole numbers are each there once.
-    few = whole(low=1, high=4, count=30)
-    assert (few.grid().tolist(), few.size) == ([1, 2, 3, 4], 4)
-    assert [p.size for p in (real(low=1.0, high=2.0, count=7), real(values=(1, 2)), real())] == [
-        7,
-        2,
-        0,
-    ]
-    assert whole(low=1, high=9).size == 0
+@given(parameter=parameters(), place=st.integers(0, 4))
+@settings(deadline=None)
+def test_study_names_what_is_wrong_with_a_parameter(
+    parameter: tuple[Key, dict[str, Any], float], place: int
+) -> None:
+    key, table, _ = parameter
+    # Of a random design no range has a count.
+    wrong = {"lower": 1, "unit": "furlong", "count": 3, [*table][0]: ["x"], "start": 1}
+    word = [*wrong][place]
+    study = {"design": {"kind": "random", "size": 8}}
+    with pytest.raises(thud.InputError, match=naming(f"[parameters] {key.name}", word)):
+        thud.read_study({**study, "parameters": {key.name: {**table, word: wrong[word]}}})
 
 
 @pytest.mark.parametrize(
-    ("name", "given", "words"),
+    ("name", "table", "expected"),
     [
-        ("height", {"low": 1, "high": 2}, ""), ("height", {"low": 1, "high": 1}, naming("low", 1)),
-        ("height", {"low": 0, "high": 1, "scale": "log"}, naming("low", 0)),
-        ("height", {"low": -1, "high": 1}, ""), ("height", {"low": 1, "high": 2, "count": 2}, ""),
-        ("height", {"low": 1, "high": 2, "count": 1}, naming("count", 1)),
-        ("height", {"low": 1, "high": 2, "count": MAX_VALUES + 1}, naming("count", 2, MAX_VALUES)),
-        ("rings", {"low": 10, "high": 12, "count": 3}, ""),
-        ("rings", {"low": 10, "high": 12, "count": 4}, naming("count", 4)),
-        ("rings", {"std": 2}, "whole"), ("height", {"std": 0}, naming("std", 0)),
-        ("height", {"std": 0.1}, ""), ("height", {"values": []}, "values"),
-        ("rings", {"values": [10.5]}, "10.5"), ("height", {"values": [math.nan]}, "nan"),
-        ("height", {"low": 1}, "high"), ("height", {}, "values"),
+        ("height", {"low": 1.0, "high": 3.0, "count": 5}, [1, 1.5, 2, 2.5, 3]),
+        ("height", {"low": 1.0, "high": 4.0, "count": 3, "scale": "log"}, [1, 2, 4]),
+        ("height", {"values": [3, 1, 2]}, [3, 1, 2]),
+        ("rings", {"low": 11, "high": 14, "count": 3}, [11, 12, 14]),
+        ("rings", {"low": 11, "high": 14, "count": 4}, [11, 12, 13, 14]),
     ],
-)  # fmt: skip
-def test_bounds_of_parameters(name: str, given: dict[str, Any], words: str) -> None:
-    if words:
-        with pytest.raises(thud.InputError, match=words):
-            read_varied(name, given, CASE, 1.0)
-    else:
-        found = read_varied(name, {**given, "unit": "cm"} if name == "height" else given, CASE, 0.7)
-        size = 0.01 if name == "height" else 1
-        for word in ("low", "high", "std"):
-            if word in given:
-                assert getattr(found, word) == pytest.approx(size * given[word])
-        assert found.mean == (0.7 if "std" in given else None)
-        assert found.count == given.get("count", 0)
+)
+def test_grids_have_their_ends_and_count(
+    name: str, table: dict[str, Any], expected: list[float]
+) -> None:
+    study = thud.read_study({"parameters": {name: table}})
+    assert study.count == len(expected)
+    assert study.parameter_columns(0, study.count)[name] == pytest.approx(expected)
 
 
-@pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        ({"size": 0, "kind": "random"}, naming("size", 0)), ({"size": 1, "kind": "random"}, ""),
-        ({"size": 3, "kind": "saltelli"}, naming("size", 3)), ({"size": 4, "kind": "saltelli"}, ""),
-        ({"size": 12, "kind": "sobol"}, naming("size", 8, 16)), ({"size": 16, "kind": "sobol"}, ""),
-        ({"size": 12, "kind": "latin_hypercube"}, ""), ({"size": MAX_VALUES + 1}, "size"),
-        ({"size": 5, "seed": -1}, "seed"), ({"size": 5, "seed": 2}, ""),
-        ({"kind": "grid"}, naming("values", "grid")),
-    ],
-)  # fmt: skip
-def test_bounds_of_designs(given: dict[str, Any], words: str) -> None:
-    kinds = (*sampling.SAMPLED, "grid", "list")
-    parameters = (real(low=1.0, high=2.0),)
-    if words:
-        with pytest.raises(thud.InputError, match=words):
-            read_design(given, kinds, parameters)
-    else:
-        kind = given.get("kind", "random")
-        expected = {"design": kind, "size": given["size"], "seed": given.get("seed", 0)}
-        assert read_design(given, kinds, parameters) == expected
-
-
-def test_grids_and_lists_need_values_that_fit() -> None:
-    two, three = real(low=1.0, high=2.0, count=2), real(values=(1, 2, 3))
-    assert read_design({"kind": "list"}, ("list",), (three, three)) == {"design": "list"}
-    with pytest.raises(thud.InputError, match=naming("values")):
-        read_design({"kind": "list"}, ("list",), (two, three))
-    with pytest.raises(thud.InputError, match=naming("count", "random")):
-        read_design({"size": 4}, ("random",), (two,))
-    largest = (replace(two, count=2**12), replace(two, count=2**12))
-    assert read_design({}, ("grid",), largest) == {"design": "grid"}
-    with pytest.raises(thud.InputError, match=naming("grid", MAX_VALUES)):
-        read_design({}, ("grid",), (*largest, three))
+def test_largest_grid_is_that_of_the_limit() -> None:
+    two = {"low": 1, "high": 2, "count": 2**12}
+    study = thud.read_study({"parameters": {"height": two, "mass": two}})
+    assert study.count == MAX_VALUES
 
 
 def test_samples_of_saltelli_exchange_one_column_each() -> None:
@@ -157,41 +158,6 @@ def test_what_varies_by_rounding_only_has_no_indices() -> None:
             found = sobol_indices(middle * (1 + size * draw), 2, 1)
             assert np.isfinite(found[2]).all() == known
     assert np.isnan(sobol_indices(np.full(64, np.nan), 2)).all()
-
-
-def test_shift_is_that_of_williams_landel_and_ferry() -> None:
-    law = Temperature(20.0, c1=8.0, c2=100.0)
-    at = np.array([20.0, 30.0, 5.0, -50.0, -80.0, -90.0])
-    above = at[:4] - 20
-    assert np.log10(law.shift(at)[:4]) == pytest.approx(-8 * above / (100 + above))
-    assert np.isnan(law.shift(at)[4:]).all()
-    assert Temperature(20.0, coefficient=-0.01).shift(at).tolist() == [1] * 6
-    assert law.keys == ("youngs_modulus", "loss_factor")
-    assert Temperature(20.0, coefficient=-0.01).keys == ("youngs_modulus",)
-
-
-@pytest.mark.parametrize(
-    ("given", "words"),
-    [
-        ({"reference": 20, "coefficient": 0}, ""), ({"reference": 20, "c1": 8, "c2": 1}, ""),
-        ({"reference": 20, "c1": 0, "c2": 1}, naming("c1", 0)),
-        ({"reference": 20, "c1": 8}, naming("c2")),
-        ({"reference": 20, "c1": 8, "c2": -1}, naming("c2", -1)),
-        ({"coefficient": 1}, naming("reference")),
-        ({"reference": 20}, naming("coefficient")), (None, naming("[temperature]", "parameter")),
-    ],
-)  # fmt: skip
-def test_bounds_of_the_law_of_temperature(given: dict[str, float] | None, words: str) -> None:
-    case = thud.Case(model=thud.ModalBall(damping_law="rising"))
-    varying = (read_varied("temperature", {"values": [20, 30]}, CASE, None),)
-    if words:
-        with pytest.raises(thud.InputError, match=words):
-            read_temperature(given, case, varying)
-        return
-    found = read_temperature(given, case, varying)
-    assert {word: getattr(found, word) for word in given} == given
-    with pytest.raises(thud.InputError, match=naming("[temperature]", "parameter")):
-        read_temperature(given, case, ())
 
 
 def uncertainty(levels: np.ndarray, conforms: list[bool], **more: Any) -> Uncertainty:  # noqa: ANN401

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import REPOSITORY, names_in, naming, python
+from conftest import REPOSITORY, SHELL, names_in, naming, noted, python
 from hypothesis import HealthCheck, given, settings, strategies as st
 from scipy.stats import qmc
 
@@ -28,17 +28,18 @@ if TYPE_CHECKING:
     from pathlib import Path
     from types import ModuleType
 
-    from conftest import ErrorsOf
 
 HEIGHTS = {"parameters": {"height": {"values": [50, 100], "unit": "cm"}}}
 
 
-@pytest.mark.parametrize("model", ["hollow_sphere", "modal_ball"])
-@pytest.mark.parametrize("bands", ["third", "both"])
+@pytest.mark.parametrize(
+    ("model", "bands"),
+    [("hollow_sphere", "third"), ("hollow_sphere", "both"), ("modal_ball", "both")],
+)
 def test_thirds_on_request(model: str, bands: str, tmp_path: Path) -> None:
     study = {
         "fixed": {"model": model, "bands": bands},
-        "parameters": {"height": {"values": [0.5, 1.0]}, "mass": {"values": [2.4, 2.5, 2.6]}},
+        "parameters": {"height": {"values": [0.5, 1.0]}, "mass": {"values": [2.4, 2.6]}},
     }
     found = thud.sweep(study, tmp_path).dataset
     assert found["floor_third"].dims == ("height", "mass", "third")
@@ -46,8 +47,8 @@ def test_thirds_on_request(model: str, bands: str, tmp_path: Path) -> None:
     assert found["elastic_octave"].dims == ("height", "mass", "octave")
     impact = thud.solve(thud.Ball(mass=2.6), thud.Drop(height=0.5), model)
     for force in ("elastic", "floor"):
-        for name, kind in ((f"{force}_octave", "octave"), (f"{force}_third", "third")):
-            cell = found[name].sel(height=0.5, mass=2.6)
+        for kind in ("octave", "third"):
+            cell = found[f"{force}_{kind}"].sel(height=0.5, mass=2.6)
             np.testing.assert_allclose(cell, impact.levels(kind, force=force), atol=1e-6)
     assert thud.Sweep(found).plot().axes
 
@@ -122,31 +123,6 @@ def test_drawn_designs_fill_their_range(design: str) -> None:
         assert qmc.discrepancy(whole) < 0.2 * qmc.discrepancy(
             np.random.default_rng(1).random((256, 3))
         )
-
-
-def test_spreads_have_their_quantiles() -> None:
-    study = thud.read_study(
-        {
-            "design": {"kind": "latin_hypercube", "size": 4000},
-            "fixed": {"model": "modal_ball"},
-            "parameters": {
-                "mass": {"std": 100, "unit": "g"},
-                "height": {"low": 0.01, "high": 100, "scale": "log"},
-                "rings": {"low": 10, "high": 12},
-                "substeps": {"low": 2, "high": 7, "scale": "log"},
-                "damping_law": {"values": ["constant", "rising"]},
-            },
-        }
-    )
-    found = study.parameter_columns(0, 4000)
-    assert np.quantile(found["mass"], [0.0228, 0.5, 0.9772]) == pytest.approx(
-        [2.3, 2.5, 2.7], abs=2e-3
-    )
-    assert np.median(found["height"]) == pytest.approx(1.0, rel=0.01)
-    assert np.unique(found["rings"], return_counts=True)[1] == pytest.approx(4000 / 3, rel=0.01)
-    share = np.unique(found["substeps"], return_counts=True)[1] / 4000
-    assert share == pytest.approx(np.diff(np.log(np.arange(2, 9))) / np.log(8 / 2), abs=1e-3)
-    assert (found["damping_law"] == "rising").mean() == pytest.approx(0.5, abs=1e-3)
 
 
 def test_list_pairs_values_and_entries_of_lists() -> None:
@@ -328,146 +304,11 @@ def test_fixed_model_is_that_of_the_case_or_has_its_defaults() -> None:
         assert getattr(study.case.model, "rings", None) == rings
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("", naming("[parameters]")),
-        ("[parameters]\n[parameters]", naming("TOML")),
-        ("sets = 3", naming("'sets'", "name", "case")),
-        (
-            "parameters.temperature.values = [19]\ntemperature.c1 = 8\ntemperature.c2 = 120",
-            naming("[temperature]", "reference", "coefficient"),
-        ),
-        (
-            'case = "\\n"\nparameters.height.values = [1]',
-            naming("file", "namelist"),
-        ),
-        ("parameters = 3", naming("parameters", 3, "table")),
-        ("name = 'a/b'\nparameters.height.values = [1]", naming("name", "'a/b'")),
-        ("name = '..'\nparameters.height.values = [1]", naming("name", "'..'")),
-        ("format = 'csv'\nparameters.height.values = [1]",
-         naming("'format'", "design")),
-        ("case = 'no.nml'\nparameters.height.values = [1]", naming("no.nml")),
-        ("parameters.hight.values = [1]", naming("'hight'", "modal_ball", "'height'")),
-        ("parameters.friction.values = [1]",
-         naming("'friction'", "&ball", "&drop", "&modal_ball")),
-        ("fixed.mass = {}\nparameters.height.values = [1]", naming("mass", "value")),
-        (f"name = {'[' * 10_000}", naming("TOML")),
-        ("name = '\udcff'", naming("byte 9", "UTF-8", "TOML")),
-        ("parameters.height = 1", naming("height", 1, "values", "low")),
-        ("parameters.height.values = ['high']", naming("height", "values", "'high'")),
-        ("parameters.height.values = [inf]", naming("height", "values", "finite")),
-        ("parameters.youngs_modulus = {values=[1e300], unit='GPa'}",
-         naming("youngs_modulus", "values", "finite")),
-        ("parameters.height = {values=[1], unit='s'}",
-         naming("height", "unit", "'s'", "m", "cm", "mm")),
-        ("parameters.height = {values=[1], unit=['m']}", naming("height", "unit", ["m"], "cm")),
-        ("parameters.height = {values=[1], count=2}",
-         naming("height", "'count'", "values", "unit")),
-        ("parameters.height = {low=1, high=2}", naming("height", "values", "grid")),
-        (
-            f"parameters.height = {{low=1, high=2, count=1{'0' * 400}}}",
-            naming("height", "count"),
-        ),
-        (
-            "parameters = {height=$, mass=$, gravity=$}".replace(
-                "$", "{low=1, high=2, count=10_000_000}"),
-            naming("samples", 2**24, "grid"),
-        ),
-        (f"design.seed = 1{'0' * 5000}", naming("TOML")),
-        ("parameters.height = {std=1}", naming("height", "values", "grid")),
-        ("parameters.damping_law.values = ['some']", naming("damping_law", "'some'", "'rising'")),
-        ("parameters.damping_law = {low=1, high=2}", naming("damping_law", "values")),
-        ("parameters.bands.values = ['third']", naming("bands", "[fixed]")),
-        ("fixed.mass = -2\nparameters.height.values = [1]", naming("&ball: mass", -2.0)),
-        ("base = 'a.nml'\nparameters.height.values = [1]", naming("'base'", "'case'")),
-        ("parameters.height = {lower=1, upper=2}", naming("height", "'lower'", "'low'")),
-        ("parameters.height = {start=1}", naming("height", "'start'", "values", "low")),
-        ("fixed.hight = 1\nparameters.mass.values = [1]", naming("'hight'", "'height'")),
-        ("fixed.model = 'cube'\nparameters.mass.values = [1]", naming("'cube'", "'hollow_sphere'")),
-        ("fixed.height = {value=1, unit='Pa'}\nparameters.mass.values = [1]",
-         naming("height", "'Pa'", "cm")),
-        ("fixed = {mass=1, density=1000}\nparameters.height.values = [1]",
-         naming("mass", "density")),
-        ("fixed.density = 1000\nparameters.mass.values = [1]", naming("mass", "density")),
-        ("fixed.mass = 2\nparameters.density.values = [1000]", naming("mass", "density")),
-        ("fixed.mass = 2\nparameters.mass.values = [1]", naming("[fixed]", "mass", "[parameters]")),
-        (
-            "fixed.density = 900\nparameters.density.values = [1000]",
-            naming("[fixed]", "density", "[parameters]"),
-        ),
-        (
-            "fixed.mass = 2\ndesign = {kind='random', size=9}\nparameters.mass={std=1, mean=3}",
-            naming("mass", "std", "mean"),
-        ),
-        ("fixed.temperature = 1\nparameters.mass.values = [1]",
-         naming("temperature", "[parameters]")),
-        ("parameters.temperature.values = [1]", naming("reference", "degC", "coefficient")),
-        ("temperature.reference = 1\nparameters.temperature.values = [1]",
-         naming("[temperature]", "coefficient")),
-        (
-            "fixed.model = 'hollow_sphere'\ntemperature = {reference=1, c1=8, c2=100}\n"  # noqa: ISC004
-            "parameters.temperature.values = [1]",
-            naming("c1", "hollow_sphere"),
-        ),
-        (
-            "fixed.model = 'modal_ball'\ntemperature = {reference=1, c1=8, c2=100}\n"  # noqa: ISC004
-            "parameters = {temperature.values=[1], damping_law.values=['rising']}",
-            naming("c1", "damping_law"),
-        ),
-        ("design.kind = 'cube'\nparameters.mass.values = [1]",
-         naming("cube", "grid", "list", "random")),
-        ("design.size = 3\nparameters.mass.values = [1]", naming("'size'", "kind")),
-        (
-            "fixed.model = 'measured_modes'\nparameters.frequency.values = [1]",
-            naming("frequency", "list", "'frequency(1)'"),
-        ),
-        (
-            "fixed = {model='measured_modes', frequency=[1], 'frequency(2)'=3}\nparameters.mass={}",
-            naming("frequency(2)", 1),
-        ),
-    ],
-)  # fmt: skip
-def test_bad_studies_are_reported(
-    text: str, words: str, tmp_path: Path, errors_of: ErrorsOf
-) -> None:
-    path = tmp_path / "study.toml"
-    path.write_bytes(text.encode(errors="surrogateescape"))
-    errors = errors_of("sweep", "-q", path, "-o", tmp_path)
-    assert str(path) in errors
-    with pytest.raises(thud.InputError, match=words):
-        thud.read_study(path)
-    assert list(tmp_path.iterdir()) == [path]
-
-
 def test_numbers_of_numpy_are_numbers() -> None:
     plain = {"fixed": {"substeps": 2}, "parameters": {"height": {"values": [0.5, 0.75, 1.0]}}}
     for heights in (np.linspace(0.5, 1, 3), list(np.linspace(0.5, 1, 3)), (0.5, 0.75, 1)):
         study = {"fixed": {"substeps": np.int64(2)}, "parameters": {"height": {"values": heights}}}
         assert thud.read_study(study).identity == thud.read_study(plain).identity
-
-
-@pytest.mark.parametrize(
-    ("study", "words"),
-    [
-        ({"fixed": {"mass": np.ones((9, 9))}}, naming("mass", "numbers")),
-        ({"fixed": {"wall_thickness": 0.1}}, naming(2, "&ball: wall_thickness", 0.1, "0.089 m")),
-        ({"fixed": {"mass": {1, 2}}}, naming("set", "tables")),
-        ({"fixed": {"mass": 10**5000}}, naming("tables")),
-    ],
-)
-def test_bad_tables_are_reported(study: dict[str, Any], words: str) -> None:
-    with pytest.raises(thud.InputError, match=words) as told:
-        thud.sweep({**HEIGHTS, **study})
-    assert "\n" not in str(told.value)
-
-
-def test_missing_study_is_reported(tmp_path: Path, errors_of: ErrorsOf) -> None:
-    assert "no.toml" in errors_of("sweep", tmp_path / "no.toml")
-    with pytest.raises(TypeError, match=naming("study", "int")):
-        thud.sweep(3)  # type: ignore[arg-type]
-    with pytest.raises(thud.InputError, match=naming("no path")):
-        thud.sweep("a\0b.toml")
 
 
 SWEEP = (REPOSITORY / "inputs/studies/sweep.toml").read_text()
@@ -512,13 +353,6 @@ def test_command_writes_figure_and_table(
     assert "Results: outputs/sweep" in printed.out
 
 
-def test_study_of_another_kind_is_reported() -> None:
-    study = thud.read_study(HEIGHTS)
-    for function in (thud.sensitivity, thud.design, thud.uncertainty):
-        with pytest.raises(thud.InputError, match=naming("python", "sweep")):
-            function(study)
-
-
 def test_missing_packages_are_reported(tmp_path: Path) -> None:
     code = "import sys; sys.modules['xarray'] = None; from thud import cli; sys.exit(cli.main())"
     done = python("-c", code, "sweep", "study.toml", cwd=tmp_path)
@@ -533,27 +367,12 @@ def test_fixed_values_may_suit_parameters_only() -> None:
     assert (thud.sweep(thick).dataset["status"] == 0).all()
 
 
-def test_unknown_keywords_are_reported() -> None:
-    with pytest.raises(thud.InputError, match=naming("'threads'", "workers")):
-        thud.sweep(HEIGHTS, threads=2)
-    for word in ("case", "executor", "surrogate"):
-        with pytest.raises(TypeError, match=word):
-            thud.sweep(HEIGHTS, **{word: 3})
-
-
-def test_parameters_of_python_are_those_of_files() -> None:
-    table = {"low": 50, "high": 100, "count": 3, "unit": "cm"}
-    parameter = thud.Parameter(**table)
-    one, other = ({"parameters": {"height": height}} for height in (table, parameter))
-    assert thud.read_study(one).identity == thud.read_study(other).identity
-
-
 def test_design_that_exceeds_the_memory_is_told(tmp_path: Path) -> None:
-    # 8 samples of 6 numbers for each of 2**24 base samples: 6 GB.
+    # 12 numbers for each of 2**24 base samples: 1.6 GB.
     names = ("height", "mass", "gravity", "outer_radius", "wall_thickness", "youngs_modulus")
     ranges = "\n".join(f"{name} = {{low = 1, high = 2}}" for name in names)
     (tmp_path / "large.toml").write_text(f"design.size = {2**24}\n[parameters]\n{ranges}\n")
-    limit = 4 * 2**30
+    limit = 3 * 2**29
     done = python(
         *("-P", "-m", "thud", "sensitivity", "-q", "large.toml"),
         cwd=tmp_path,
@@ -567,8 +386,7 @@ def test_design_that_exceeds_the_memory_is_told(tmp_path: Path) -> None:
 
 def test_values_by_names_of_keys_are_a_grid() -> None:
     height = thud.Parameter(low=50, high=100, count=2, unit="cm")
-    case = thud.Case(model=thud.HollowSphere())
-    found = thud.sweep({"height": height, "mass": [2.4, 2.6]}, case=case)
+    found = thud.sweep({"height": height, "mass": [2.4, 2.6]}, case=SHELL)
     masses = {"values": np.array([2.4, 2.6])}
     table = {"fixed": {"model": "hollow_sphere"}, "parameters": {"height": height, "mass": masses}}
     assert found.dataset.drop_attrs().identical(thud.sweep(table).dataset.drop_attrs())
@@ -576,15 +394,8 @@ def test_values_by_names_of_keys_are_a_grid() -> None:
     assert frame.loc[0.5, 2.6]["floor_octave_63"] == found.dataset["floor_octave"].values[0, 1, 1]
     # Scalars, ranges and columns are arrays, as for `solve_many`.
     values = {"height": found.dataset["height"], "substeps": range(2, 4), "mass": 2.4}
-    assert dict(thud.sweep(values).dataset.sizes) == {
-        "height": 2, "substeps": 2, "mass": 1, "octave": 5,
-    }  # fmt: skip
-    with pytest.raises(thud.InputError, match=naming("mass", "dimension")):
-        thud.sweep({"mass": [[2.4, 2.6]]})
-    with pytest.raises(thud.InputError, match=naming("'hight'", "'height'")):
-        thud.sweep({"hight": [1.0]})
-    with pytest.raises(thud.InputError, match=naming("case")):
-        thud.sweep({"case": {"drop": {}}, "parameters": {}}, case=case)
+    sizes = {"height": 2, "substeps": 2, "mass": 1, "octave": 5}
+    assert dict(thud.sweep(values).dataset.sizes) == sizes
 
 
 @pytest.mark.parametrize("kind", ["sensitivity", "design", "uncertainty"])
@@ -601,10 +412,8 @@ def test_results_are_functions_of_their_samples(kind: str, tmp_path: Path) -> No
 def test_samples_state_sources_that_do_not_conform() -> None:
     """The shell reads low from 125 Hz on; the source of a room whose case names none conforms."""
     case = {"floor": {"name": "plate"}, "room": {}}
-    study = {
-        "design": {"kind": "grid"},
-        "parameters": {"plate.thickness": {"low": 0.14, "high": 0.2, "count": 2}},
-    }
-    shell = thud.sweep({"case": {**case, "model": {"name": "hollow_sphere"}}, **study})
-    assert "2 of 2 samples do not conform" in " ".join(map(str, shell.notes))
-    assert thud.sweep({"case": case, **study}).notes == ()
+    parameters = {"plate.thickness": {"values": [0.14, 0.2]}}
+    shell = {"case": {**case, "model": {"name": "hollow_sphere"}}, "parameters": parameters}
+    note = noted(thud.sweep(shell).notes, "samples_not_standard")
+    assert (note.value, note.high) == (2, 2)
+    assert thud.sweep({"case": case, "parameters": parameters}).notes == ()
