@@ -162,22 +162,6 @@ def test_lost_scheduler_is_reported_and_its_study_goes_on_elsewhere(
     assert found.drop_attrs(deep=False).identical(expected_modal)
 
 
-def test_other_version_is_reported() -> None:
-    with pytest.raises(thud.InputError, match=naming("version", "0.0.1", thud.__version__)):
-        evaluate(thud.read_study({"height": [1.0]}), {"height": np.ones(1)}, "0.0.1")
-
-
-@pytest.mark.parametrize("workers", [0, 2000])
-def test_useless_numbers_of_workers_are_reported(workers: int) -> None:
-    with pytest.raises(thud.InputError, match=naming("workers", workers, 1, 1024)):
-        thud.sweep(STUDY, workers=workers)
-    with (
-        ThreadPoolExecutor(1) as executor,
-        pytest.raises(thud.InputError, match=naming("workers", 2, "executor")),
-    ):
-        thud.sweep(STUDY, workers=2, executor=executor)
-
-
 def test_ended_executor_is_reported() -> None:
     executor = ThreadPoolExecutor(1)
     executor.shutdown()

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import names_in, naming
+from conftest import names_in
 
 import thud
 from thud import cli
@@ -55,33 +54,6 @@ def test_gas_that_leaves_gives_no_force() -> None:
     assert 1.3 * forces["isothermal"] < forces["adiabatic"] < 1.6 * forces["isothermal"]
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"model": "measured_modes"}, naming("model", "compression")),
-        (
-            {"model": thud.HuntCrossley(contact_time=0.02)},
-            naming("stiffness", 0, "&compression", "contact_time"),
-        ),
-        ({"max_deflection": 0.178, "model": "hollow_sphere"}, naming("max_deflection", "0.178 m")),
-        ({"max_deflection": 0.12, "model": "hollow_sphere"}, naming("max_deflection", "0.12 m")),
-        ({"max_deflection": 0.0}, naming("max_deflection", 0.0, "1e-15")),
-        ({"model": "modal_ball", "max_deflection": 0.15}, naming("ring")),
-        ({"points": 1}, naming("points", 1, 2, 10000)),
-        ({"gas": "hot"}, naming("gas", "'hot'", "'vented'", "'adiabatic'")),
-        (
-            {"ball": thud.Ball(gauge_pressure=1e3), "model": "hollow_sphere"},
-            naming("gas", "'vented'", "gauge_pressure", 1000.0),
-        ),
-    ],
-)
-def test_impossible_compressions_are_refused(options: dict[str, object], words: str) -> None:
-    if options.get("model") == "measured_modes":
-        options = {"model": thud.MeasuredModes([30.0], [0.1], [2.5])}
-    with pytest.raises(thud.ThudError, match=words):
-        thud.compress(**options)  # type: ignore[arg-type]
-
-
 CASE = "&drop / &ball poisson_ratio = 0.45 / &model name = 'modal_ball' / "
 
 
@@ -104,14 +76,6 @@ def test_file_asks_for_a_compression(run: Run, tmp_path: Path) -> None:
     again = thud.read_results(folder)
     assert again.case.compression == thud.Compression(0.02, 5, "isothermal")
     assert "quasi-static compression" in repr(again.case)
-
-
-def test_compression_takes_a_model(run: Run, tmp_path: Path) -> None:
-    case = tmp_path / "ball.nml"
-    case.write_text("&modes / &compression /")
-    done = run(case)
-    assert done.returncode == 1
-    assert re.search(naming("&compression", "line 1", "&modes"), done.stderr)
 
 
 def test_driver_draws_the_compression_of_a_case(tmp_path: Path) -> None:

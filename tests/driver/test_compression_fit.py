@@ -102,26 +102,6 @@ def test_curve_that_begins_under_load_is_doubted(measured: Measured) -> None:
     assert note.others["name"] == "touch"
 
 
-@pytest.mark.parametrize(
-    ("deflection", "force", "words"),
-    [
-        ([0, 1e-3], [0, 1], naming("deflection", "force", 2, 5)),
-        ([0, 1e-3, 2e-3, 3e-3, 4e-3], [0, 1], naming("deflection", "force", 5, 2)),
-        ([0, 1e-3, 1e-3, 2e-3, 3e-3], range(5), naming("deflection", "point 3")),
-        ([0, 1e-3, 2e-3, 3e-3, np.nan], range(5), naming("deflection", "finite")),
-        ([0, 1e-3, 2e-3, 3e-3, 4e-3], [4, 3, 2, 1, 0], naming("force", "deflection")),
-        ([0, 1e-3, 2e-3, 3e-3, 4e-3], [1, 1, 1, 1, 1], naming("force", "deflection")),
-        ([0, 1e-3, 2e-3, 3e-3, 4e-3], [-2, -1, 0, 0, 0], naming("force", "deflection")),
-        ([0, 1e-3, 2e-3, 3e-3, 0.2], range(5), naming("max_deflection", "0.178 m")),
-        ("curve", range(5), naming("deflection")),
-    ],
-)
-def test_what_is_no_curve_is_refused(deflection: object, force: object, words: str) -> None:
-    values = list(force) if isinstance(force, range) else force
-    with pytest.raises(thud.InputError, match=words):
-        thud.fit(thud.CompressionTarget(deflection, values), E, CASE)  # type: ignore[arg-type]
-
-
 def test_modulus_of_a_spring_that_has_none_has_no_effect(measured: Measured) -> None:
     spring = replace(CASE, model=thud.HuntCrossley(stiffness=2e5))
     fit = quiet_fit(thud.CompressionTarget(*measured), E, spring)

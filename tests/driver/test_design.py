@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY, naming
+from conftest import REPOSITORY
 from matplotlib.collections import LineCollection
 
 import thud
@@ -119,19 +119,6 @@ def test_places_without_results_stay_empty() -> None:
     assert int(np.isnan(result.dataset["margin"]).sum()) == 3
     result.plot()
     assert ("samples", "9") in result.rows()
-
-
-@pytest.mark.parametrize(
-    "parameters",
-    [
-        {"height": {"values": [1, 2]}, "mass": {"values": [2, 2]}},
-        {"height": {"values": [1, 2]}, "damping_law": {"values": ["rising", "constant"]}},
-        {name: {"values": [1, 2]} for name in ("height", "mass", "gravity")},
-    ],
-)
-def test_what_is_no_map_is_reported(parameters: dict[str, Any]) -> None:
-    with pytest.raises(thud.InputError, match=naming("[parameters]")):
-        thud.design({"parameters": parameters})
 
 
 @pytest.fixture(scope="module")

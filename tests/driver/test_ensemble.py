@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from conftest import naming, python
+from conftest import SHELL, naming, python
 from hypothesis import given, settings, strategies as st
 
 import thud
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 FLUX = ["momentum_balance", "retarding", "conservative", "none"]
-SHELL = thud.Case(model=thud.HollowSphere())
 THIRDS = replace(SHELL, levels=thud.Levels(bands="third"))
 
 
@@ -73,35 +72,33 @@ def assert_same_bits(
 
 
 def test_equals_the_single_solver() -> None:
-    parameters = random_sets(80, 1)
+    parameters = random_sets(40, 1)
     near = {"outer_radius": 0.06105, "wall_thickness": 0.0244, "mass": 2.59, "height": 1.0,
             "gauge_pressure": 17.8e3, "poisson_ratio": 0.5, "gravity": 9.81,
             "ambient_pressure": 101325.0, "heat_capacity_ratio": 1.4,
             "momentum_flux": "momentum_balance"}  # fmt: skip
     for key, value in near.items():
-        parameters[key][:40] = value
-    parameters["youngs_modulus"][:40] = np.random.default_rng(5).uniform(1.9e6, 2.2e6, 40)
-    case = replace(THIRDS, sampling=thud.Sampling(duration=0.2))
+        parameters[key][:20] = value
+    parameters["youngs_modulus"][:20] = np.linspace(1.9e6, 2.2e6, 20)
+    case = replace(THIRDS, sampling=thud.Sampling(duration=0.1))
     ensemble = thud.solve_many(parameters, case, forces=True)
     assert not ensemble.status.any()
-    assert ensemble.elastic_force is not None
-    assert ensemble.floor_force is not None
     for i in range(len(ensemble)):
-        impact = single(parameters, i, duration=0.2)
+        impact = single(parameters, i, duration=0.1)
         for force in ("elastic", "floor"):
             expected = impact.force(force)
             actual = getattr(ensemble, f"{force}_force")[i]
             np.testing.assert_allclose(actual, expected, rtol=0, atol=1e-10 * expected.max())
-            levels = impact.levels(force=force)
-            thirds = impact.levels("third", force=force)
-            np.testing.assert_allclose(getattr(ensemble, f"{force}_octave")[i], levels, atol=1e-6)
-            np.testing.assert_allclose(getattr(ensemble, f"{force}_third")[i], thirds, atol=1e-6)
+            for kind in ("octave", "third"):
+                levels = impact.levels(kind, force=force)
+                actual = getattr(ensemble, f"{force}_{kind}")[i]
+                np.testing.assert_allclose(actual, levels, atol=1e-6)
         for name in ("contact_time", "peak_force", "peak_elastic_force", "max_deflection",
                      "restitution", "impulse"):  # fmt: skip
             assert getattr(ensemble, name)[i] == pytest.approx(getattr(impact, name), rel=1e-10)
         assert ensemble.conforms[i] == bool(impact.assess())
     # Small, heavy balls; some of them conform by the force on the floor.
-    assert 5 < np.count_nonzero(ensemble.conforms) < 35
+    assert 2 < np.count_nonzero(ensemble.conforms) < 18
 
 
 def test_fails_where_the_single_solver_fails() -> None:
@@ -201,43 +198,6 @@ def test_scalars_and_defaults() -> None:
     assert empty.results["elastic_third"].shape == (0, 15)
 
 
-@pytest.mark.parametrize(
-    ("parameters", "options", "words"),
-    [
-        ({"radius": 1}, {}, naming("'radius'", "modal_ball", "&ball", "&drop")),
-        ({"height": [1, 2], "mass": [1, 2, 3]}, {}, naming("height (2,)", "mass (3,)")),
-        ({"height": [[1]]}, {}, naming("height", "1 dimensions")),
-        ({"height": [[1], [1, 2]]}, {}, naming("height", "array")),
-        ({"height": ["one"]}, {}, naming("height", "real")),
-        ({"height": [1j]}, {}, naming("height", "real")),
-        ({"height": np.ma.masked_less([1.0, -1.0], 0)}, {}, naming("height", "masked")),
-        ({"damping_law": "some"}, {}, naming("damping_law", "'some'", "'rising'")),
-        ({"damping_law": ["rising", "some"]}, {}, naming("'some'")),
-        ([1], {}, naming("parameters", [1])),
-        (np.ones(2), {}, naming("parameters")),
-        ({}, {"threads": 0}, naming("threads", 0, 1, 1024)),
-        ({}, {"threads": 1025}, naming("threads", 1025, 1, 1024)),
-        ({}, {"threads": 1.5}, naming("threads", 1.5)),
-        ({"density": 1.0}, {}, naming("'density'", "studies")),
-        ({"bands": "third"}, {}, naming("bands")),
-        ({1: [1.0]}, {}, naming(1, "modal_ball", "&ball")),
-        ({"height": np.broadcast_to(1.0, 10**13)}, {}, naming("parameters", "memory")),
-        ({"duration": [0.05, 0.1]}, {"forces": True}, naming("forces", "sampling")),
-        ({}, {"model": []}, naming("model", [])),
-        ({}, {"forces": np.ones(2)}, naming("forces", "bool")),
-        ({}, {"case": thud.Case(modes=thud.Modes(), model=None)}, naming("case", "model")),
-        (
-            {"height": np.ones(10_000_000)},
-            {"case": lasting(10.0), "forces": True},
-            naming("forces", 441000),
-        ),
-    ],
-)
-def test_bad_input_is_named(parameters: object, options: dict[str, object], words: str) -> None:
-    with pytest.raises((thud.InputError, TypeError), match=words):
-        thud.solve_many(parameters, **options)  # type: ignore[arg-type]
-
-
 @settings(max_examples=60, deadline=None)
 @given(
     st.dictionaries(
@@ -262,21 +222,27 @@ def test_any_input_gives_numbers_or_a_clear_error(parameters: dict[str, object])
     assert np.isnan(ensemble.contact_time[ensemble.status != 0]).all()
 
 
-def test_threads_are_the_processors_of_the_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    compute, widths = ensemble._compute, []  # noqa: SLF001
+def watched_calls(monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, int]]:
+    """Return the list that the calls of the library fill: numbers of samples and of threads."""
+    compute, calls = ensemble._compute, []  # noqa: SLF001
 
     def watched(*arguments: Any, **options: Any) -> dict[str, np.ndarray]:  # noqa: ANN401
-        widths.append(arguments[3])
+        calls.append((len(arguments[2]), arguments[3]))
         return compute(*arguments, **options)
 
     monkeypatch.setattr(ensemble, "_compute", watched)
+    return calls
+
+
+def test_threads_are_the_processors_of_the_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = watched_calls(monkeypatch)
     # Of this process, 0, and of no other.
     monkeypatch.setattr("os.sched_getaffinity", {0: {1, 4, 5}}.__getitem__)
     thud.solve_many({"mass": [2.4, 2.5]}, model="hollow_sphere")
-    assert widths == [3]
+    assert calls == [(2, 3)]
 
 
-@pytest.mark.parametrize("method", ["fork", "forkserver", "spawn"])
+@pytest.mark.parametrize("method", ["fork", "spawn"])
 def test_processes_that_start_after_threads_go_on(method: str, tmp_path: Path) -> None:
     """A forked process has none of the threads that its parent had started."""
     script = tmp_path / "script.py"
@@ -355,31 +321,24 @@ def test_unusual_drops_equal_single_drops(
 
 
 def test_calls_of_any_size_give_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
-    parameters = random_sets(50, 4)
+    parameters = random_sets(20, 4)
     whole = thud.solve_many(parameters, THIRDS, forces=True)
-    sizes = []
-    compute = ensemble._compute  # noqa: SLF001
-
-    def count(*arguments: Any, **options: Any) -> dict[str, Any]:  # noqa: ANN401
-        sizes.append(len(arguments[2]))
-        return compute(*arguments, **options)
-
-    monkeypatch.setattr(ensemble, "_compute", count)
+    calls = watched_calls(monkeypatch)
     # The forces take a call for a few samples; a bar has steps of some samples.
-    for most, expected in ((148e3, [33, 17]), (1e9, [50]), (1.0, [1] * 50)):
-        sizes.clear()
+    for most, expected in ((60e3, [13, 7]), (1e9, [20]), (1.0, [1] * 20)):
+        calls.clear()
         monkeypatch.setattr(ensemble, "_MAX_VALUES", int(most))
         parts = thud.solve_many(parameters, THIRDS, forces=True)
         assert_same_bits(whole, parts)
         np.testing.assert_array_equal(parts.floor_force, whole.floor_force)
-        assert sizes == expected
+        assert [size for size, _ in calls] == expected
     monkeypatch.setattr(ensemble, "_MAX_VALUES", 2**26)
-    sizes.clear()
+    calls.clear()
     thud.solve_many({"height": np.ones(9)}, model="hollow_sphere", threads=1, progress=True)
-    assert sizes == [4, 4, 1]
+    assert calls == [(4, 1), (4, 1), (1, 1)]
 
 
-@pytest.mark.parametrize("bands", ["octave", "third", "both"])
+@pytest.mark.parametrize("bands", ["third", "both"])
 def test_numbers_below_a_floor_stand_in_their_columns(bands: Any) -> None:  # noqa: ANN401
     case = thud.Case(
         model=thud.HollowSphere(), floor=thud.Plate(thickness=0.1), room=thud.Room(),
@@ -443,7 +402,5 @@ def test_columns_of_a_table_are_parameters() -> None:
     expected = thud.solve_many(columns, model="hollow_sphere")
     assert list(found.parameters) == list(expected.parameters)
     np.testing.assert_array_equal(found.restitution, expected.restitution)
-    with pytest.raises(thud.InputError, match=naming("'heigth'", "'height'")):
-        thud.solve_many(pandas.DataFrame({"heigth": [1.0]}), model="hollow_sphere")
     # Without columns there is the drop of the case.
     assert len(thud.solve_many(pandas.DataFrame(), model="hollow_sphere")) == 1

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY, SHELL, names_in, naming, quiet_fit
+from conftest import REPOSITORY, names_in, naming, quiet_fit
 from scipy import stats
 
 import thud
 from thud import cli
-from thud.studies.fit import read_fit_study, run_fit
+from thud.studies.fit import read_fit_study
 from thud.studies.fitting.comparison import UNLIKELY
 
 if TYPE_CHECKING:
@@ -196,34 +196,6 @@ def test_study_of_several_records(folder: Path, capsys: pytest.CaptureFixture[st
         assert abs(entry["value"] - truth) < FAR * entry["standard_error"]
     assert not saved["warnings"]
     assert thud.read_case(folder / "found/fitted_1.nml").drop.height == 0.1
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ("height = 1.0", "mass = 2.0", naming("target 2", "fixed", "mass")),
-        ("height = 1.0", "heigth = 1.0", naming("'heigth'", "'height'")),
-        ('unit = "cm"', 'unit = "N"', naming("target 1", "fixed height", "'N'", "cm")),
-        ("gain = 0.02", "gain = 'no'", naming("target 2", "gain", "'no'")),
-        ("gain = 0.02", "window = [0.02, 0.05]", naming("target 2", "residuals")),
-        ("drop_2.csv", "drop_9.csv", naming("drop_9.csv")),
-    ],
-)
-def test_bad_records_are_named(folder: Path, old: str, new: str, words: str) -> None:
-    assert old in STUDY
-    (folder / "study.toml").write_text(STUDY.replace(old, new))
-    with pytest.raises(thud.InputError, match=words) as caught:
-        run_fit("study.toml")
-    assert "\n" not in str(caught.value)
-
-
-def test_lists_of_something_else_are_refused() -> None:
-    for targets in ([], [3], [thud.solve(model="hollow_sphere")]):
-        with pytest.raises(thud.InputError, match=naming("target", "list")):
-            thud.fit(targets, ["youngs_modulus"], case=SHELL)  # type: ignore[arg-type]
-    for given in ([], [3]):
-        with pytest.raises(thud.InputError, match=naming("table", "[target]")):
-            read_fit_study({"target": given, "parameters": {"mass": {}}})
 
 
 def test_study_of_the_repository_can_be_read() -> None:

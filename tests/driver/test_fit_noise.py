@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import codes, naming, quiet_fit
+from conftest import codes, quiet_fit
 from scipy import stats
 from scipy.linalg import toeplitz
 
@@ -324,24 +324,3 @@ def test_too_little_quiet_warns() -> None:
     inside = (time > QUIET - 0.005) & (time < QUIET + 0.027)
     fit = quiet_fit((time[inside], force[inside]), TRUTH, CASE)
     assert [note.code for note in fit.warnings] == ["background_too_short"]
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"gain": -0.1}, naming("target", "gain", -0.1, 0)),
-        ({"fixed": 3}, naming("target", "fixed", "int")),
-        ({"fixed": {"height": 2.0}}, naming("target", "fixed", "height")),
-        ({"fixed": {"size": 2.0}}, naming("'size'", "hollow_sphere")),
-        ({"fixed": {"mass": "big"}}, naming("target", "fixed mass", "'big'")),
-        ({"fixed": {"mass": -2.0}}, naming("&ball: mass", -2.0, "kg")),
-        (
-            {"gain": 0.1, "window": (QUIET - 0.005, QUIET + 0.027)},
-            naming("target", "gain", 0.1, "noise", "0.02 s"),
-        ),
-    ],
-)
-def test_bad_options_get_one_sentence(options: dict[str, object], words: str) -> None:
-    target = thud.ForceTarget(record("white noise"), **options)  # type: ignore[arg-type]
-    with pytest.raises((thud.InputError, TypeError), match=words):
-        thud.fit(target, TRUTH, CASE)

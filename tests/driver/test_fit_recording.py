@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY, SHELL, naming, quiet_fit
+from conftest import REPOSITORY, SHELL, quiet_fit
 from synthetic import cut_drops, make_recording, with_force
 
 import thud
@@ -186,37 +186,6 @@ def test_table_is_measured_where_a_drop_is_chosen(two: Path) -> None:
     (two / "study.toml").write_text(text)
     found = run_fit(read_fit_study("study.toml"))
     assert found.values["youngs_modulus"] == pytest.approx(1.8e6, rel=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("more", "words"),
-    [
-        ("drop = 3", naming("target", "drop", 3, 1, 2)),
-        ("drop = 0", naming("target", "drop", 0, 1, 2)),
-        ("drop = 'one'", naming("target", "drop", "'one'", 1, 2)),
-        ("config = 1", naming("[target]", "config", 1)),
-        ("config = 'no.toml'", naming("no.toml")),
-        ("drops = 1", naming("'drops'", "drop")),
-    ],
-)
-def test_bad_targets_get_one_sentence(two: Path, more: str, words: str) -> None:
-    with pytest.raises((thud.InputError, OSError), match=words) as caught:
-        run(two, more)
-    assert "\n" not in str(caught.value)
-
-
-def test_recording_that_is_missing_or_none_gets_one_sentence(two: Path) -> None:
-    (two / "record.wav").write_bytes(b"RIFF")
-    with pytest.raises(thud.InputError, match=naming("record.wav")):
-        run(two)
-    (two / "record.wav").unlink()
-    with pytest.raises(thud.InputError, match=naming("record.wav")):
-        run(two)
-
-
-def test_arrays_have_one_drop(shell: thud.Impact) -> None:
-    with pytest.raises(thud.InputError, match=naming("target", "drop", 2)):
-        ForceTarget((shell.time, shell.floor_force), drop=2).compare()
 
 
 @pytest.mark.parametrize("name", ["fit_recording", "fit_recording_constant_loss"])

@@ -82,15 +82,6 @@ def test_units_are_those_of_the_file() -> None:
     assert "1.56" in fit.table()
 
 
-def test_values_are_those_of_the_file_to_the_last_bit(tmp_path: Path) -> None:
-    text = (
-        '[target]\nfile = "record.csv"\n[parameters]\nwall_thickness = { start = 36, unit = "mm" }'
-    )
-    (tmp_path / "study.toml").write_text(text)
-    (parameter,) = read_fit_study("study.toml").parameters
-    assert parameter.start == 0.036
-
-
 def test_doubts_are_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     shell = 'case = { model = { name = "hollow_sphere" } }\n'
     (tmp_path / "study.toml").write_text(f"{shell}{STUDY}wall_thickness = {{ start = 0.03 }}")
@@ -145,63 +136,6 @@ def test_useless_directory_is_reported_before_the_search(
     (tmp_path / "found").mkdir()
     (tmp_path / "found/notes.txt").touch()
     assert place in errors_of("fit", "-q", "-o", place, "study.toml")
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        ("youngs_modulus", "hardness", naming("[parameters]", "hardness", "outer_radius")),
-        ("MPa", "mm", naming("[parameters] youngs_modulus", "'mm'", "Pa", "kPa")),
-        ("1.4", "-1", naming("youngs_modulus", "-1000000.0", 0)),
-        ("1.4", "'soft'", naming("youngs_modulus", "start", "'soft'")),
-        ("1.4", "nan", naming("start", "nan")),
-        ("1.4", f"1{'0' * 400}", naming("youngs_modulus", "start")),
-        ("start", "lower", naming("[parameters] youngs_modulus", "'lower'", "'low'")),
-        ("start", "begin", naming("'begin'", "start", "low", "high", "unit")),
-        ("file", "files", naming("[target]", "file", "levels")),
-        ("record.csv", "nowhere.csv", naming("nowhere.csv")),
-        ("[target]", "[targets]", naming("'targets'", "'target'", "case", "fixed")),
-        ("[target]", "case = 'no.nml'\n[target]", naming("no.nml")),
-        ("[target]", "starts = 1.5\n[target]", naming("starts", 1.5, 1)),
-        ("[target]", "seed = -1\n[target]", naming("seed", -1, 0)),
-        ("[target]", "confidence = 2\n[target]", naming("confidence", 2, 0, 1)),
-        ("[target]", "fixed.mass = -1\n[target]", naming("&ball: mass", -1.0)),
-        ("[target]", "fixed.density = -1\n[target]", naming("&ball: mass", "kg")),
-        (
-            "[target]",
-            "fixed.youngs_modulus = 1\n[target]",
-            naming("[fixed]", "youngs_modulus", "[parameters]"),
-        ),
-        ("[target]", "[target", naming("study.toml", "TOML")),
-        ("[target]", "[target]\nnoise = 0", naming("noise", 0)),
-        ("[target]", "[target]\nwindow = 3", naming("window", 3)),
-        ('file = "record.csv"', "levels = [39]", naming("levels", [39], 5)),
-        ('file = "record.csv"', "levels = []\nbands = []", naming("bands", [])),
-        ('file = "record.csv"', "levels = [1]\nfrequencies = 3", naming("frequencies", 3, 1)),
-        (
-            'file = "record.csv"',
-            "levels = [39, 31, 23, 17, 12]\ncontact_time = 20",
-            naming("contact_time", 20, "value"),
-        ),
-        (
-            'file = "record.csv"',
-            "levels = [39, 31, 23, 17, 12]\ncontact_time = {value=20, uncertainty=1, unit='m'}",
-            naming("contact_time", "'m'", "s", "ms", "us"),
-        ),
-    ],
-)
-def test_bad_studies_are_reported(
-    old: str, new: str, words: str, tmp_path: Path, errors_of: ErrorsOf
-) -> None:
-    assert old in STUDY
-    (tmp_path / "study.toml").write_text(STUDY.replace(old, new))
-    error = errors_of("fit", "study.toml")
-    assert len(error.strip().splitlines()) == 1
-    assert re.search(words, error), error
-
-
-def test_study_that_is_not_there_is_reported(errors_of: ErrorsOf) -> None:
-    assert "nowhere.toml" in errors_of("fit", "nowhere.toml")
 
 
 def test_targets_are_those_of_their_script(

@@ -152,14 +152,6 @@ def test_alternative_that_cannot_be_computed_is_named(monkeypatch: pytest.Monkey
         thud.fit(drop, START, ASSUMED)
 
 
-@pytest.mark.parametrize("unknowns", ["friction", ["fricton"], 3])
-def test_unknowns_are_a_list_of_their_names(unknowns: object) -> None:
-    with pytest.raises(thud.InputError, match=naming("unknowns")):
-        thud.fit(
-            thud.solve(model="hollow_sphere"), ["youngs_modulus"], unknowns=unknowns, case=SHELL
-        )  # type: ignore[arg-type]
-
-
 def test_records_share_their_unknowns() -> None:
     """Of two records of one ball the effects are the same, of one each they are more freely so."""
     drops = [record("as assumed", np.random.default_rng(seed), 0.02) for seed in (1, 2)]

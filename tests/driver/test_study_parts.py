@@ -105,7 +105,7 @@ def test_study_names_what_is_wrong_with_a_parameter(
 ) -> None:
     key, table, _ = parameter
     # Of a random design no range has a count.
-    wrong = {"lower": 1, "unit": "furlong", "count": 3, [*table][0]: ["x"], "start": 1}
+    wrong = {"lower": 1, "unit": "furlong", "count": 3, next(iter(table)): ["x"], "start": 1}
     word = [*wrong][place]
     study = {"design": {"kind": "random", "size": 8}}
     with pytest.raises(thud.InputError, match=naming(f"[parameters] {key.name}", word)):

@@ -356,43 +356,6 @@ def test_figure_shows_held_out_errors(trained: thud.Surrogate) -> None:
     np.testing.assert_array_equal(shown[-1], trained.residuals[:, trained.assessed][:, -1])
 
 
-@pytest.mark.parametrize("path", [3, "", "none.nc", {"file": "none.nc"}])
-def test_studies_name_a_trained_surrogate(path: object) -> None:
-    with pytest.raises(thud.InputError, match=naming("surrogate" if path != "none.nc" else path)):
-        thud.sweep({**LUMPED, "surrogate": path})
-
-
-@pytest.mark.parametrize("size", [MIN_DROPS // 2, 2**14])
-def test_numbers_of_drops_are_bounded(size: int) -> None:
-    with pytest.raises(thud.InputError, match=naming("[design] size", size, MIN_DROPS)):
-        thud.surrogate({**LUMPED, "design": {"size": size}})
-
-
-@pytest.mark.parametrize(
-    ("name", "entry"),
-    [
-        ("sample_rate", {"low": 20000.0, "high": 44100.0}), ("substeps", {"low": 1, "high": 3}),
-        ("density", {"low": 1.0, "high": 2.0}), ("damping_law", {"values": ["rising"]}),
-        ("height", {"std": 0.1, "mean": 1.0}), ("height", {"values": [1.0, 2.0]}),
-    ],
-)  # fmt: skip
-def test_only_ranges_of_real_parameters_are_learned(name: str, entry: dict[str, Any]) -> None:
-    study = {"design": {"size": 64}, "fixed": {"model": "modal_ball"}, "parameters": {name: entry}}
-    with pytest.raises(thud.InputError, match=naming("surrogate", name)):
-        thud.surrogate(study)
-
-
-def test_density_is_no_key_of_a_surrogate() -> None:
-    with pytest.raises(thud.InputError, match=naming("density", "surrogate", "mass")):
-        thud.surrogate({**REGION, "fixed": {**FIXED, "density": 1100.0}})
-
-
-def test_drops_without_result_are_refused() -> None:
-    study = {**LUMPED, "parameters": {**LUMPED["parameters"], "mass": {"low": -1, "high": 3}}}
-    with pytest.raises(thud.InputError, match=naming(64, "&ball: mass")):
-        thud.surrogate(study)
-
-
 def test_fewest_drops_are_those_of_the_order_statistic() -> None:
     # The largest of n bounds 95 % with a confidence of 1 - 0.95**n.
     fewest = math.ceil(math.log(0.05) / math.log(0.95))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import subprocess
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -32,42 +32,6 @@ def test_unknowns_survive_files(tmp_path: Path, executable: str) -> None:
     assert thud.read_case(echo).unknowns == case.unknowns
 
 
-@pytest.mark.parametrize(
-    ("changes", "named"),
-    [
-        ({"key": ("frction", "fractional_order")}, ("key", "frction", "friction")),
-        ({"key": ("friction", "friction")}, ("key", "friction", "twice")),
-        ({"key": ("sample_rate", "friction")}, ("key", "sample_rate")),
-        ({"low": (0.0,)}, ("low", "1", "2")),
-        ({"reason": ()}, ("reason", "0", "2")),
-        ({"key": ()}, ("key",)),
-        ({"standard_deviation": (0.1,)}, ("standard_deviation", "1", "2")),
-        ({"low": (-0.1, 0.2)}, ("low", "-0.1", "friction")),
-        ({"high": (0.5, 1.5)}, ("high", "1.5", "fractional_order")),
-        ({"low": (0.5, 0.2)}, ("low", "0.5", "friction")),
-        ({"low": (0.1, 0.2)}, ("low", "0.1", "friction", "outside")),
-    ],
-)
-def test_message_names_what_is_wrong_with_unknowns(
-    changes: dict[str, Any], named: tuple[str, ...]
-) -> None:
-    with pytest.raises(thud.InputError, match=naming("&unknowns", *named)):
-        thud.assess(replace(ELEMENTS, unknowns=replace(FRICTION, **changes)))
-
-
-@pytest.mark.parametrize(
-    ("case", "named"),
-    [
-        (thud.Case(unknowns=thud.Unknowns()), ("&unknowns: key", "missing")),
-        (thud.Case(model=None, modes=thud.Modes()), ("&model", "missing")),
-        (thud.Case(model=None, modes=thud.Modes(), unknowns=FRICTION), ("&model", "missing")),
-    ],
-)
-def test_case_without_keys_or_model_is_refused(case: thud.Case, named: tuple[str, ...]) -> None:
-    with pytest.raises(thud.InputError, match=naming(*named)):
-        thud.assess(case)
-
-
 def test_unknown_without_an_effect_is_refused() -> None:
     unknowns = thud.Unknowns(key="fractional_order", low=0.2, high=0.9, reason="not measured")
     assert unknowns.key == ("fractional_order",)
@@ -75,14 +39,6 @@ def test_unknown_without_an_effect_is_refused() -> None:
     with pytest.raises(thud.InputError, match=naming("&unknowns", "fractional_order", "same drop")):
         thud.assess(case)
     assert thud.assess(replace(case, model=thud.ModalBall(damping_law="fractional"))).counts[1]
-
-
-@pytest.mark.parametrize("text", ["it is", "'a', b", "'a' 'b", "1, 2", f"'{'x' * 129}'"])
-def test_list_of_texts_needs_quotes(text: str, tmp_path: Path) -> None:
-    path = tmp_path / "case.nml"
-    path.write_text(f"&unknowns key = {text} / &model name = 'finite_element' /")
-    with pytest.raises(thud.InputError, match=r"up to 16 texts in quotes|a quote is not closed"):
-        thud.read_case(path)
 
 
 def test_normal_distribution_is_truncated_and_a_wide_one_uniform() -> None:
