@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 RATE = 44100.0
 HEIGHTS = (0.1, 1.0, 1.6)
+# Their standard deviations, N.
+NOISES = (1.0, 5.0, 8.0)
 QUIET = 1000
 # A miss by four standard errors has a probability of 6e-5.
 FAR = 4.0
@@ -68,32 +70,29 @@ def drops() -> list[Record]:
     """Return records from three heights, each with its own noise and offset."""
     return [
         record(CASE, height, noise, seed, 4.0 * seed)
-        for seed, (height, noise) in enumerate(zip(HEIGHTS, (1.0, 5.0, 8.0), strict=True))
+        for seed, (height, noise) in enumerate(zip(HEIGHTS, NOISES, strict=True))
     ]
+
+
+def targets_of(drops: list[Record]) -> list[thud.ForceTarget]:
+    """Return the targets of drops from the first heights."""
+    pairs = zip(drops, HEIGHTS, strict=False)
+    return [thud.ForceTarget(drop, fixed={"height": height}) for drop, height in pairs]
 
 
 def test_three_heights_give_modulus_and_mass(drops: list[Record]) -> None:
-    targets = [
-        thud.ForceTarget(drop, fixed={"height": height})
-        for drop, height in zip(drops, HEIGHTS, strict=True)
-    ]
-    fit = thud.fit(targets, {"youngs_modulus": 1.6e6, "mass": 2.4}, CASE)
+    fit = thud.fit(targets_of(drops), {"youngs_modulus": 1.6e6, "mass": 2.4}, CASE)
     assert not fit.warnings
     assert fit.names[2:] == ("time_shift(1)", "time_shift(2)", "time_shift(3)")
     for name, value in TRUTH.items():
         assert abs(fit.values[name] - value) < FAR * fit.standard_errors[name]
     for number, target in enumerate(fit.targets):
         assert target.case.drop.height == HEIGHTS[number]
-        # What lies under the pulse: the offset, to the noise of 40 ms.
+        # What lies under the pulse: the offset, to the noise of 40 ms, which hold some 60 values.
         under = np.asarray(target.columns()["background_N"])
         assert abs(under.mean() - 4.0 * number) < FAR
-    # 40 ms of quiet hold some 60 values.
-    found = re.search(
-        r"target 3: noise of (\S+) N in the compared band, from the background", str(fit)
-    )
-    assert found
-    band = np.sqrt(2 * 1250 / RATE)
-    assert float(found[1]) == pytest.approx(8.0 * band, rel=FAR / np.sqrt(2 * 60))
+        noise = target.comparison.unit_deviation
+        assert noise == pytest.approx(NOISES[number], rel=FAR / np.sqrt(2 * 60))
 
 
 def test_information_of_records_adds() -> None:
@@ -126,10 +125,7 @@ def test_forces_and_levels_are_fitted_together() -> None:
 
 def test_record_that_does_not_fit_the_others_is_named(drops: list[Record]) -> None:
     time, force = drops[1]
-    targets = [
-        thud.ForceTarget(drops[0], fixed={"height": 0.1}),
-        thud.ForceTarget((time, 1.05 * force), fixed={"height": 1.0}),
-    ]
+    targets = targets_of([drops[0], (time, 1.05 * force)])
     with pytest.warns(thud.FitWarning) as caught:
         thud.fit(targets, list(TRUTH), CASE)
     assert any("target 2" in str(one.message) for one in caught)
@@ -154,12 +150,8 @@ def test_residuals_of_a_target_have_its_share_of_the_parameters() -> None:
 
 
 def test_heights_do_not_tell_modulus_from_wall(drops: list[Record]) -> None:
-    targets = [
-        thud.ForceTarget(drop, fixed={"height": height})
-        for drop, height in zip(drops[:2], HEIGHTS, strict=False)
-    ]
     with pytest.warns(thud.FitWarning, match=naming("youngs_modulus * wall_thickness^2")):
-        fit = thud.fit(targets, ["youngs_modulus", "wall_thickness"], CASE)
+        fit = thud.fit(targets_of(drops[:2]), ["youngs_modulus", "wall_thickness"], CASE)
     assert np.isinf(fit.standard_errors["youngs_modulus"])
 
 

@@ -5,25 +5,21 @@ from __future__ import annotations
 import csv
 import re
 import resource
-import signal
-import subprocess
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import names_in, naming
+from conftest import naming
 
 import thud
 from thud.case.keys import with_values
 from thud.level.levels import SOURCES
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
 
     from conftest import Run
 
-FILES = ["samples.csv", "samples.nml", "thud.txt"]
 CASE = """&case name = 'ball' / &ball mass = 2.45 / &drop height = 1.0 /
 &model name = 'hollow_sphere' /
 """
@@ -129,11 +125,6 @@ def test_threads_change_no_byte(run: Run, case: Path, tmp_path: Path) -> None:
     assert len(rows_of(tmp_path / "1/samples.csv")) == 20_000
 
 
-def test_greatest_number_of_threads_is_taken(run: Run, case: Path) -> None:
-    # What is missing is a table, or memory for so many.
-    assert "--threads" not in run(case, "--samples", "none.csv", "--threads", "1024").stderr
-
-
 @pytest.mark.parametrize(
     "text",
     [
@@ -227,54 +218,6 @@ def test_verdict_is_on_the_force_and_source_of_each_set(
     assert "level, " not in result.stdout
 
 
-def test_threads_without_memory_for_their_buffers_are_refused(run: Run, case: Path) -> None:
-    def little_memory() -> None:
-        resource.setrlimit(resource.RLIMIT_AS, (2**30, 2**30))
-
-    arguments = (case, "--samples", "none.csv", "--threads", "64")
-    result = run(*arguments, preexec_fn=little_memory)
-    assert (result.returncode, result.stderr.count("\n")) == (2, 1)
-
-
-def test_endless_lines_take_no_memory(run: Run, case: Path) -> None:
-    def little_memory() -> None:
-        resource.setrlimit(resource.RLIMIT_AS, (300 * 2**20, 300 * 2**20))
-
-    result = run(case, "--samples", "/dev/zero", preexec_fn=little_memory)
-    assert (result.returncode, result.stdout) == (1, "")
-    assert re.search(naming("/dev/zero", "line 1", 2**20), result.stderr)
-
-
-def test_nothing_is_written_where_results_have_no_place(
-    run: Run, case: Path, tmp_path: Path
-) -> None:
-    (tmp_path / "table.csv").write_text("height\n1\n")
-    assert run(case, "--samples", "table.csv", "-o", "o").returncode == 0
-    before = (tmp_path / "o/samples.nml").read_bytes()
-    (tmp_path / "o/samples.csv").unlink()
-    (tmp_path / "o/samples.csv/in_the_way").mkdir(parents=True)
-    case.write_text(CASE.replace("2.45", "2.5"))
-    result = run(case, "--samples", "table.csv", "-o", "o")
-    assert result.returncode == 1
-    assert "samples.csv" in result.stderr
-    assert (tmp_path / "o/samples.nml").read_bytes() == before
-    assert names_in(tmp_path / "o") == FILES
-
-
-def test_results_replace_neither_case_nor_table(run: Run, case: Path, tmp_path: Path) -> None:
-    (tmp_path / "table.csv").write_text("height\n1\n")
-    assert run(case, "--samples", "table.csv", "-o", "o").returncode == 0
-    for source, arguments in {
-        case: ["o/samples.csv", "--samples", "table.csv"],
-        tmp_path / "table.csv": [case, "--samples", "o/samples.csv"],
-    }.items():
-        (tmp_path / "o/samples.csv").write_bytes(source.read_bytes())
-        result = run(*arguments, "-o", "o", "--replace")
-        assert result.returncode == 1
-        assert re.search(naming("o/samples.csv"), result.stderr)
-        assert (tmp_path / "o/samples.csv").read_bytes() == source.read_bytes()
-
-
 def test_results_of_single_drops_and_of_samples_are_kept_apart(
     run: Run, case: Path, tmp_path: Path
 ) -> None:
@@ -287,34 +230,18 @@ def test_results_of_single_drops_and_of_samples_are_kept_apart(
         assert re.search(naming(arguments[-1], "holds"), result.stderr.splitlines()[0])
 
 
-@pytest.fixture
-def at_work(executable: str, case: Path, tmp_path: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """Return a long run that has begun to write into the directory o, beside a short table."""
-    heights = np.linspace(0.5, 1.5, 60_000)
-    (tmp_path / "long.csv").write_text("height\n" + "\n".join(map(str, heights)))
-    (tmp_path / "short.csv").write_text("height\n1\n")
-    command = [executable, case, "--samples", "long.csv", "-q", "-o", "o"]
-    with subprocess.Popen(command, cwd=tmp_path) as process:
-        while not list(tmp_path.glob(".o.*.new/samples.csv")):
-            assert process.poll() is None
-        yield process
-
-
-@pytest.mark.slow
-def test_last_of_two_runs_has_its_results_in_the_directory(
-    at_work: subprocess.Popen[bytes], run: Run, case: Path, tmp_path: Path
+@pytest.mark.parametrize(
+    ("arguments", "limit", "code"),
+    [("none.csv --threads 64", 2**30, 2), ("/dev/zero", 300 * 2**20, 1)],
+    ids=["threads", "endless line"],
+)
+def test_little_memory_is_reported(
+    run: Run, case: Path, arguments: str, limit: int, code: int
 ) -> None:
-    assert run(case, "--samples", "short.csv", "-q", "-o", "o").returncode == 0
-    assert at_work.wait() == 0
-    assert len(rows_of(tmp_path / "o/samples.csv")) == 60_000
-    assert not list(tmp_path.glob(".o.*"))
+    def set_limit() -> None:
+        resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
 
-
-def test_interrupted_samples_leave_nothing(
-    at_work: subprocess.Popen[bytes], run: Run, case: Path, tmp_path: Path
-) -> None:
-    at_work.send_signal(signal.SIGINT)
-    assert at_work.wait() == 130
-    assert not (tmp_path / "o").exists()
-    assert not list(tmp_path.glob(".o.*"))
-    assert run(case, "--samples", "short.csv", "-q", "-o", "o").returncode == 0
+    result = run(case, "--samples", *arguments.split(), preexec_fn=set_limit)
+    assert (result.returncode, result.stdout, result.stderr.count("\n")) == (code, "", 1)
+    if code == 1:
+        assert re.search(naming("/dev/zero", "line 1", 2**20), result.stderr)

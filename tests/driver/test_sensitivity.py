@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY, naming
+from conftest import REPOSITORY
 
 import thud
 from thud.studies.sampling import unit_samples
@@ -67,22 +67,16 @@ def test_indices_of_a_source_whose_levels_are_a_sum(lumped: Sensitivity) -> None
     assert (np.abs(levels["total"].sel(parameter="outer_radius")) < 1e-12).all()
     assert lumped.indices["output"].values.tolist()[-2:] == ["contact time", "peak force"]
     assert lumped.left_out == 0
-
-
-def test_what_does_not_vary_has_no_indices(lumped: Sensitivity) -> None:
-    # Contact time is the one that was asked for.
+    # The contact time is the one that was asked for: what does not vary has no indices.
     assert np.isnan(lumped.indices.sel(output="contact time")["total"]).all()
 
 
 def test_samples_without_results_are_left_out() -> None:
-    study = {**LUMPED, "parameters": {**LUMPED["parameters"], "mass": {"low": -0.5, "high": 3.0}}}
-    result = thud.sensitivity(study)
+    masses = {**LUMPED["parameters"], "mass": {"low": -0.5, "high": 3.0}}
+    result = thud.sensitivity({**LUMPED, "parameters": masses})
     # A base sample is lost with its own mass or with that of its other matrix.
     assert 0 < result.left_out < 64
     assert np.isfinite(result.indices["total"].sel(output="peak force")).all()
-    study["parameters"]["mass"] = {"low": -3.0, "high": -2.0}
-    with pytest.raises(thud.InputError, match=naming(640, "mass")):
-        thud.sensitivity(study)
 
 
 def test_figure_shows_every_index(lumped: Sensitivity) -> None:
@@ -105,12 +99,8 @@ def test_figure_shows_every_index(lumped: Sensitivity) -> None:
 
 
 def test_figure_of_five_parameters_fits_on_half_a_page() -> None:
-    parameters = {
-        **LUMPED["parameters"],
-        "gravity": {"low": 9.7, "high": 9.9},
-        "wall_thickness": {"low": 0.03, "high": 0.034},
-    }
-    study = {**LUMPED, "design": {"size": 8}, "parameters": parameters}
+    more = {name: {"low": 0.030, "high": 0.034} for name in ("wall_thickness", "gravity")}
+    study = {**LUMPED, "design": {"size": 8}, "parameters": {**LUMPED["parameters"], **more}}
     assert thud.sensitivity(study).plot().get_figheight() < 4.4
 
 
