@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import doctest
+import itertools
 import os
 import re
 import resource
@@ -30,6 +31,11 @@ if TYPE_CHECKING:
 
 
 HEIGHTS = {"parameters": {"height": {"values": [50, 100], "unit": "cm"}}}
+
+
+def swept(fixed: dict[str, Any], parameters: dict[str, Any], **tables: object) -> xr.Dataset:
+    """Return the results of a sweep."""
+    return thud.sweep({"fixed": fixed, "parameters": parameters, **tables}).dataset
 
 
 @pytest.mark.parametrize(
@@ -126,50 +132,37 @@ def test_drawn_designs_fill_their_range(design: str) -> None:
 
 
 def test_list_pairs_values_and_entries_of_lists() -> None:
-    found = thud.sweep(
+    ratios = {"damping_ratio": [0.05, 0.05], "effective_mass": [2.4, 0.1]}
+    found = swept(
+        {"model": "measured_modes", "frequency": [24, 89], **ratios},
         {
-            "fixed": {
-                "model": "measured_modes",
-                "frequency": [24, 89],
-                "damping_ratio": [0.05, 0.05],
-                "effective_mass": [2.4, 0.1],
-            },
-            "design": {"kind": "list"},
-            "parameters": {
-                "frequency(2)": {"values": [80, 0.09], "unit": "Hz"},
-                "damping_ratio(1)": {"values": [4, 6], "unit": "%"},
-            },
-        }
-    ).dataset
+            "frequency(2)": {"values": [80, 0.09], "unit": "Hz"},
+            "damping_ratio(1)": {"values": [4, 6], "unit": "%"},
+        },
+        design={"kind": "list"},
+    )
     assert found["contact_time"].dims == ("sample",)
-    options = {"damping_ratio": [0.04, 0.05], "effective_mass": [2.4, 0.1]}
-    impact = thud.solve(model="measured_modes", frequency=[24.0, 80.0], **options)
+    ratios["damping_ratio"] = [0.04, 0.05]
+    impact = thud.solve(model="measured_modes", frequency=[24.0, 80.0], **ratios)
     assert float(found["peak_force"][0]) == impact.peak_force
     assert found["frequency_2"].values.tolist() == [80.0, 0.09]
     assert found["frequency_2"].attrs["key"] == "frequency(2)"
 
 
 def test_key_named_as_a_result_keeps_both() -> None:
-    found = thud.sweep(
-        {
-            "fixed": {"model": "hunt_crossley", "restitution": 0.8},
-            "parameters": {"contact_time": {"values": [18, 22], "unit": "ms"}},
-        }
-    ).dataset
+    times = {"contact_time": {"values": [18, 22], "unit": "ms"}}
+    found = swept({"model": "hunt_crossley", "restitution": 0.8}, times)
     np.testing.assert_allclose(found["contact_time"], found["hunt_crossley_contact_time"])
 
 
 def test_density_and_temperature_act_on_mass_and_modulus() -> None:
     density = 2.5 / (4 / 3 * np.pi * (0.089**3 - 0.057**3))
-    study: dict[str, Any] = {
-        "fixed": {"density": density},
-        "temperature": {"reference": 20, "coefficient": -0.01},
-        "parameters": {"temperature": {"values": [20, 30]}, "outer_radius": {"values": [0.089]}},
-    }
-    found = thud.sweep(study).dataset.isel(outer_radius=0)
+    parameters = {"temperature": {"values": [20, 30]}, "outer_radius": {"values": [0.089]}}
+    law = {"reference": 20, "coefficient": -0.01}
+    found = swept({"density": density}, parameters, temperature=law)["contact_time"]
     for place, modulus in enumerate((1.56e6, 1.404e6)):
         impact = thud.solve(thud.Ball(youngs_modulus=modulus))
-        assert float(found["contact_time"][place]) == pytest.approx(impact.contact_time, rel=1e-12)
+        assert float(found[place, 0]) == pytest.approx(impact.contact_time, rel=1e-12)
 
 
 WLF = {"reference": 20, "c1": 8.0, "c2": 120.0}
@@ -190,73 +183,56 @@ def shifted(model: str, temperature: float, **law: object) -> tuple[float, float
 def test_temperature_shifts_the_frequency_of_the_loss() -> None:
     # At 10 degC a = 10**(80/110): the material behaves as it would at a times the frequency.
     factor = 10 ** (8 * 10 / 110)
-    law: dict[str, Any] = {
-        "viscosity": "fractional", "fractional_order": 0.4, "loss_factor": 0.1,
-    }  # fmt: skip
-    modulus, loss = shifted("finite_element", 10, **law)
+    law: dict[str, Any] = {"fractional_order": 0.4, "loss_factor": 0.1}
+    modulus, loss = shifted("finite_element", 10, **law, viscosity="fractional")
     pot = 0.1 / np.sin(0.2 * np.pi)
     expected = 1 - pot * np.exp(0.2j * np.pi).real + pot * factor**0.4 * np.exp(0.2j * np.pi)
     assert modulus == pytest.approx(0.97 * 2e6 * expected.real, rel=1e-12)
     assert loss == pytest.approx(expected.imag / expected.real, rel=1e-12)
     # The library's own law at the shifted frequency, within the error of its series.
-    ours = thud.loss_factors(thud.FiniteElement(**law), [74 * factor])[0]
-    assert loss == pytest.approx(ours, rel=0.01)
+    material = thud.FiniteElement(**law, viscosity="fractional")
+    assert loss == pytest.approx(thud.loss_factors(material, [74 * factor])[0], rel=0.01)
     # The modal ball has the same law; Kelvin and Voigt's modulus does not depend on frequency.
-    del law["viscosity"]
     assert shifted("modal_ball", 10, **law, damping_law="fractional") == (modulus, loss)
-    for model, word in (("finite_element", "viscosity"), ("modal_ball", "damping_law")):
-        viscous = {word: "kelvin_voigt" if word == "viscosity" else "rising", "loss_factor": 0.1}
-        modulus, loss = shifted(model, 10, **viscous)
-        assert modulus == pytest.approx(0.97 * 2e6, rel=1e-12)
-        assert loss == pytest.approx(0.1 * factor, rel=1e-12)
+    viscous = {"finite_element": {"viscosity": "kelvin_voigt"}}
+    viscous["modal_ball"] = {"damping_law": "rising"}
+    for model, word in viscous.items():
+        found = shifted(model, 10, **word, loss_factor=0.1)
+        assert found == pytest.approx((0.97 * 2e6, 0.1 * factor), rel=1e-12)
     # At the reference nothing changes.
-    assert shifted("modal_ball", 20, **law, damping_law="fractional") == pytest.approx(
-        (2e6, 0.1), rel=1e-14
-    )
+    found = shifted("modal_ball", 20, **law, damping_law="fractional")
+    assert found == pytest.approx((2e6, 0.1), rel=1e-14)
 
 
 def test_samples_below_the_range_of_the_shift_have_no_results() -> None:
-    study: dict[str, Any] = {
-        "fixed": {"model": "modal_ball", "damping_law": "rising"},
-        "temperature": WLF,
-        "parameters": {"temperature": {"values": [20, -100]}},
-    }
-    found = thud.sweep(study).dataset
+    fixed = {"model": "modal_ball", "damping_law": "rising"}
+    found = swept(fixed, {"temperature": {"values": [20, -100]}}, temperature=WLF)
     assert found["status"].values.tolist() == [0, 1]
     assert "NaN" in str(found["reason"].values[1])
 
 
 def test_failing_samples_say_why_and_disturb_no_other() -> None:
-    heights = {"values": [1.0, -1.0, 1000.0]}
-    study = {"fixed": {"model": "hollow_sphere"}, "parameters": {"height": heights}}
-    found = thud.sweep(study).dataset
+    found = swept({"model": "hollow_sphere"}, {"height": {"values": [1.0, -1.0, 1000.0]}})
     assert found["status"].values.tolist() == [0, 1, 2]
-    assert found["reason"].values[0] == ""
-    assert re.search(naming("&drop: height", "-1.0"), str(found["reason"].values[1]))
-    assert re.search(naming("&drop: height", "1000.0 m"), str(found["reason"].values[2]))
-    assert found["peak_force"].values[0] == pytest.approx(
-        thud.solve(model="hollow_sphere").peak_force, rel=1e-9
-    )
+    none, negative, high = found["reason"].values.tolist()
+    assert none == ""
+    assert re.search(naming("&drop: height", "-1.0"), negative)
+    assert re.search(naming("&drop: height", "1000.0 m"), high)
+    peak = thud.solve(model="hollow_sphere").peak_force
+    assert found["peak_force"].values[0] == pytest.approx(peak, rel=1e-9)
     assert np.isnan(found["elastic_octave"].values[1:]).all()
 
 
 @pytest.mark.parametrize("fixed", [{}, {"force": "floor", "source": "tyre"}])
 def test_samples_give_what_single_drops_give(fixed: dict[str, str]) -> None:
-    study = thud.read_study(
-        {
-            "fixed": {"model": "hollow_sphere", **fixed},
-            "parameters": {
-                "height": {"values": [0.5, 1.0]},
-                "mass": {"values": [2.4, 7.3]},
-                "momentum_flux": {"values": ["none", "retarding"]},
-            },
-        }
-    )
+    values = {"height": [0.5, 1.0], "mass": [2.4, 7.3], "momentum_flux": ["none", "retarding"]}
+    parameters = {name: {"values": some} for name, some in values.items()}
+    fixed = {"model": "hollow_sphere", **fixed}
+    study = thud.read_study({"fixed": fixed, "parameters": parameters})
     found = thud.sweep(study).dataset
-    names = list(found.coords)[1:]
-    for place in np.ndindex(*(found.sizes[name] for name in names)):
-        one = found.isel(dict(zip(names, place, strict=True)))
-        impact = thud.solve(with_values(study.case, {name: one[name].item() for name in names}))
+    for place in itertools.product(*values.values()):
+        keys = dict(zip(values, place, strict=True))
+        one, impact = found.sel(keys), thud.solve(with_values(study.case, keys))
         # What the ensemble promises: 1e-10 in forces, 1e-6 dB in levels.
         for name in SAMPLE_QUANTITIES:
             assert float(one[name]) == pytest.approx(getattr(impact, name), rel=1e-9)
