@@ -118,6 +118,14 @@ def kill_at_first_block(monkeypatch: pytest.MonkeyPatch, kill: Callable[[], None
     monkeypatch.setattr(run, "write_dataset", kill_and_write)
 
 
+def assert_goes_on(study: Path | dict[str, Any], partial: Path, expected: xr.Dataset) -> None:
+    """Check that some blocks of a study are finished and that a further run computes the others."""
+    finished = thud.read_sweep(partial).dataset.sizes["sample"]
+    assert 0 < finished < MODAL["design"]["size"]
+    found = thud.sweep(study, partial.parent).dataset
+    assert found.drop_attrs(deep=False).identical(expected)
+
+
 @pytest.mark.slow
 def test_killed_worker_of_dask_loses_nothing(
     cluster: LocalCluster,
@@ -139,8 +147,8 @@ def test_lost_scheduler_is_reported_and_its_study_goes_on_elsewhere(
 ) -> None:
     study = tmp_path / "some.toml"
     study.write_text(
-        "design = {kind='random', size=160}\nfixed = {model='modal_ball', rings=20}\n"
-        "parameters.height = {low=0.9, high=1.1}"
+        f"design = {{kind='random', size={MODAL['design']['size']}}}\n"
+        "fixed = {model='modal_ball', rings=20}\nparameters.height = {low=0.9, high=1.1}"
     )
     with subprocess.Popen(
         [sys.executable, "-c", DOOMED], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
@@ -156,16 +164,12 @@ def test_lost_scheduler_is_reported_and_its_study_goes_on_elsewhere(
     _, errors = process.communicate()
     assert process.returncode == 1
     assert re.search(naming("NumericalError", "executor", "Cancelled"), errors)
-    finished = thud.read_sweep(tmp_path / "some.partial").dataset
-    assert 0 < finished.sizes["sample"] < 160
-    found = thud.sweep(study, tmp_path).dataset
-    assert found.drop_attrs(deep=False).identical(expected_modal)
+    assert_goes_on(study, tmp_path / "some.partial", expected_modal)
 
 
 def test_lost_process_is_reported_and_finished_blocks_are_kept(
     expected_modal: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    spawn = multiprocessing.get_context("spawn")
     others = set(multiprocessing.active_children())
 
     def kill() -> None:
@@ -174,11 +178,8 @@ def test_lost_process_is_reported_and_finished_blocks_are_kept(
 
     kill_at_first_block(monkeypatch, kill)
     with (
-        ProcessPoolExecutor(2, spawn) as processes,
+        ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as processes,
         pytest.raises(thud.NumericalError, match=naming("executor", "run the study again")),
     ):
         thud.sweep(MODAL, tmp_path, executor=processes)
-    finished = thud.read_sweep(tmp_path / "python.partial").dataset.sizes["sample"]
-    assert 0 < finished < MODAL["design"]["size"]
-    found = thud.sweep(MODAL, tmp_path).dataset
-    assert found.drop_attrs(deep=False).identical(expected_modal)
+    assert_goes_on(MODAL, tmp_path / "python.partial", expected_modal)

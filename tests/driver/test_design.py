@@ -12,8 +12,6 @@ from conftest import REPOSITORY
 from matplotlib.collections import LineCollection
 
 import thud
-from thud.plot.study_figures import _draw_limits
-from thud.plot.style import empty_axes
 
 MODAL: dict[str, Any] = {
     "case": str(REPOSITORY / "inputs/rubber_ball_modal.nml"),
@@ -80,14 +78,6 @@ def test_scale_of_the_study_is_that_of_the_axes() -> None:
     shown = [text.get_text() for text in axes.get_yticklabels()]
     assert {"1", "1.2", "1.4"} <= set(shown)
     assert thud.design(MODAL).plot().axes[0].get_xscale() == "linear"
-
-
-def test_limit_of_a_class_that_no_sample_passes_is_not_in_the_legend() -> None:
-    x, y = np.arange(3.0), np.arange(4.0)
-    rating = np.ma.masked_invalid(np.linspace(44.99, 52, 12).reshape(4, 3))
-    _, axes = empty_axes(2)
-    _draw_limits(axes, (x, y), rating, [("class 3, 45 dB", 45.0), ("class 4, 49 dB", 49.0)], "k")
-    assert axes.get_legend_handles_labels()[1] == ["class 4, 49 dB"]
 
 
 def test_colours_of_a_map_without_conformity_end_at_zero() -> None:

@@ -138,30 +138,25 @@ def test_threads_and_order_change_no_bit(threads: int) -> None:
 def test_invalid_samples_are_marked_and_leave_the_others() -> None:
     parameters = random_sets(40, 4)
     for i in (9, 11, 13):  # the paper's ball, whose ways to fail are known
-        ball = SHELL.resolved().ball
-        for key, value in (vars(ball) | vars(thud.Drop())).items():
+        for key, value in (vars(SHELL.resolved().ball) | vars(thud.Drop())).items():
             parameters[key][i] = value
     clean = thud.solve_many(parameters, threads=1, model="hollow_sphere")
     broken = {key: values.copy() for key, values in parameters.items()}
-    broken["outer_radius"][3] = -1
-    broken["wall_thickness"][7] = 1
-    broken["height"][9] = 1e5
-    broken["youngs_modulus"][11] = 1e11
-    broken["mass"][13] = 500
-    broken["poisson_ratio"][15] = np.inf
+    wrong = {
+        3: ("outer_radius", -1, 1, naming("&ball: outer_radius", -1.0)),
+        7: ("wall_thickness", 1, 1, naming("&ball: wall_thickness", 1.0)),
+        9: ("height", 1e5, 2, naming("&drop: height")),
+        11: ("youngs_modulus", 1e11, 1, naming("&sampling: sample_rate", "44100.0 Hz")),
+        13: ("mass", 500, 1, naming("&sampling: duration", "0.05 s")),
+        15: ("poisson_ratio", np.inf, 1, naming("&ball: poisson_ratio", "Infinity")),
+    }
+    for i, (key, value, *_) in wrong.items():
+        broken[key][i] = value
     ensemble = thud.solve_many(broken, threads=1, model="hollow_sphere", forces=True)
-    bad = [3, 7, 9, 11, 13, 15]
-    assert ensemble.status[bad].tolist() == [1, 1, 2, 1, 1, 1]
-    expected = (
-        naming("&ball: outer_radius", -1.0),
-        naming("&ball: wall_thickness", 1.0),
-        naming("&drop: height"),
-        naming("&sampling: sample_rate", "44100.0 Hz"),
-        naming("&sampling: duration", "0.05 s"),
-        naming("&ball: poisson_ratio", "Infinity"),
-    )
-    for place, words in zip(bad, expected, strict=True):
-        assert re.search(words, ensemble.reason[place])
+    for i, (*_, status, words) in wrong.items():
+        assert ensemble.status[i] == status
+        assert re.search(words, ensemble.reason[i])
+    bad = list(wrong)
     assert set(np.delete(ensemble.reason, bad)) == {""}
     assert np.isnan(ensemble.contact_time[bad]).all()
     assert np.isnan(ensemble.elastic_octave[bad]).all()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY, names_in, naming, quiet_fit
+from conftest import codes, names_in, naming, quiet_fit
 from scipy import stats
 
 import thud
@@ -119,7 +119,6 @@ def test_forces_and_levels_are_fitted_together() -> None:
     ]
     fit = thud.fit(targets, ["youngs_modulus"], CASE)
     assert abs(fit.values["youngs_modulus"] - 1.8e6) < FAR * fit.standard_errors["youngs_modulus"]
-    assert re.search(r"target 2\b.*standard deviation", str(fit))
     assert list(fit.figures()) == ["fit_1", "fit_2", "confidence"]
 
 
@@ -139,14 +138,14 @@ def test_residuals_of_a_target_have_its_share_of_the_parameters() -> None:
     levels = thud.solve(CASE).levels(force="floor") + np.array([1, -1, 1, -1, 1])
 
     def fit(uncertainty: float) -> thud.Fit:
-        target = thud.LevelTarget(levels.tolist(), uncertainty, force="floor")
+        target = thud.LevelTarget(levels, uncertainty, force="floor")
         return quiet_fit([target, target], ["youngs_modulus"], CASE)
 
-    square = fit(1.0).residuals @ fit(1.0).residuals / 2
+    residuals = fit(1.0).residuals
     for factor, expected in ((0.99, 0), (1.01, 2)):
         wanted = factor * stats.chi2.isf(UNLIKELY, 4.5)
-        told = fit(float(np.sqrt(square / wanted))).warnings
-        assert [note.code for note in told].count("unexplained") == expected
+        told = fit(float(np.sqrt(residuals @ residuals / 2 / wanted))).warnings
+        assert codes(told).count("unexplained") == expected
 
 
 def test_heights_do_not_tell_modulus_from_wall(drops: list[Record]) -> None:
@@ -188,8 +187,3 @@ def test_study_of_several_records(folder: Path, capsys: pytest.CaptureFixture[st
         assert abs(entry["value"] - truth) < FAR * entry["standard_error"]
     assert not saved["warnings"]
     assert thud.read_case(folder / "found/fitted_1.nml").drop.height == 0.1
-
-
-def test_study_of_the_repository_can_be_read() -> None:
-    study = read_fit_study(REPOSITORY / "inputs/studies/fit_heights.toml")
-    assert [term.case.drop.height for term in study.terms] == list(HEIGHTS)

@@ -303,10 +303,3 @@ def test_gain_is_found_or_known_to_an_extent() -> None:
 )  # fmt: skip
 def test_noise_of_another_kind_warns(disturbance: str, code: str) -> None:
     assert code in codes(quiet_fit(record(disturbance), TRUTH, CASE).warnings)
-
-
-def test_too_little_quiet_warns() -> None:
-    time, force = record("white noise")
-    inside = (time > QUIET - 0.005) & (time < QUIET + 0.027)
-    fit = quiet_fit((time[inside], force[inside]), TRUTH, CASE)
-    assert codes(fit.warnings) == ["background_too_short"]

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
     from conftest import CaseFile, Run
 
+# Coarse resolutions and steps, of which the impacts warn.
+pytestmark = pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
 COARSE = "&ball / &drop / &model name = 'modal_ball' /"
 COARSE += " &modal_ball rings = 10, highest_frequency = 300 /"
 
@@ -79,7 +81,6 @@ def test_shortened_steps_are_stated() -> None:
     assert impact.model_quantities["shortened_time_step"] == pytest.approx(1 / (4 * 44100))
 
 
-@pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
 def test_reduced_step_of_an_unstable_run_is_stated() -> None:
     # The bound on the step is closest for elements that are flat along the wall.
     options = {"radial_elements": 16, "polar_elements": 16, "step_safety": 0.98}
@@ -91,17 +92,12 @@ def test_reduced_step_of_an_unstable_run_is_stated() -> None:
     assert quantities["reduced_step_safety"] == pytest.approx(0.49)
 
 
-@pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
 def test_run_that_breaks_down_by_its_step_is_repeated() -> None:
     """It ended with a surface too deep in the layer, though half the step computes it."""
-    ball = thud.Ball(
-        outer_radius=0.0905, wall_thickness=0.01138, mass=1.2264, youngs_modulus=686214.0
-    )
+    ball = thud.Ball(0.0905, wall_thickness=0.01138, mass=1.2264, youngs_modulus=686214.0)
     options = {"radial_elements": 3, "polar_elements": 32, "layer_stiffness": 1.2e10}
-    material = {"viscosity": "constant_loss", "loss_factor": 0.1, "law": "mooney_rivlin"}
-    impact = thud.solve(
-        ball, thud.Drop(height=10.79), "finite_element", duration=0.3, **options, **material
-    )
+    options |= {"viscosity": "constant_loss", "loss_factor": 0.1, "law": "mooney_rivlin"}
+    impact = thud.solve(ball, thud.Drop(10.79), "finite_element", duration=0.3, **options)  # type: ignore[arg-type]
     assert impact.model_quantities["reduced_step_safety"] < 0.85
     assert impact.energy_residual < 5e-3
 
@@ -114,16 +110,12 @@ VERIFIED = {
 
 
 @pytest.mark.parametrize("name", VERIFIED)
-@pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
 def test_verification_is_a_drop_at_a_finer_resolution(name: str) -> None:
     impact = thud.solve(**VERIFIED[name], verify=True)  # type: ignore[arg-type]
     plain = thud.solve(**VERIFIED[name])  # type: ignore[arg-type]
     assert not any(name.startswith("finer") for name in plain.model_quantities)
-    finer = {
-        name.removeprefix("finer_"): value
-        for name, value in impact.model_quantities.items()
-        if name.startswith("finer_")
-    }
+    quantities = impact.model_quantities
+    finer = {name[6:]: quantities[name] for name in quantities if name.startswith("finer_")}
     levels = impact.levels(force="floor")
     assert (levels == plain.levels(force="floor")).all()
     change, error = np.array(list(finer.values())[:5]) - levels, impact.level_error
@@ -164,7 +156,6 @@ RESOLUTIONS = {
 
 
 @pytest.mark.parametrize("text", RESOLUTIONS)
-@pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
 def test_resolution_is_stated(text: str, case_file: CaseFile, run: Run) -> None:
     shown, keys, finer = RESOLUTIONS[text]
     path = case_file(f"&ball / &drop / {text} &sampling verify = .true. /")
@@ -199,7 +190,6 @@ AWKWARD = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", AWKWARD)
-@pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
 def test_elements_refine_themselves_or_state_the_error(name: str) -> None:
     """Against elements of two thirds of the size of the default."""
     keys = AWKWARD[name]
@@ -237,7 +227,6 @@ def slipping(
     return thud.solve(ball, friction=friction, **keys, **options)  # type: ignore[arg-type]
 
 
-@pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
 def test_stick_and_slip_raises_the_stated_error() -> None:
     """Meshes that are too coarse for it agree with each other."""
     least = np.array([0.05, 0.2, 0.4, 2.0, 2.0]) * 64 / 24
@@ -253,18 +242,15 @@ def test_stick_and_slip_raises_the_stated_error() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
 def test_stated_error_covers_that_of_friction() -> None:
     standard = thud.Ball()
     for friction, ball in (0.2, standard), (0.4, standard), (0.8, LARGE):
-        coarse, fine = (
-            slipping(friction, mesh, ball, duration=0.1) for mesh in ((8, 64), (16, 128))
-        )
+        coarse = slipping(friction, (8, 64), ball, duration=0.1)
+        fine = slipping(friction, (16, 128), ball, duration=0.1)
         change = np.abs(coarse.levels(force="floor") - fine.levels(force="floor"))
         assert (change <= coarse.level_error + 0.01).all()
 
 
-@pytest.mark.filterwarnings("ignore::thud.PlausibilityWarning")
 def test_short_record_is_found_at_the_coarsest_mesh() -> None:
     soft = thud.Ball(youngs_modulus=3e5, poisson_ratio=0.49)
     with pytest.raises(thud.InputError, match=r"at least 0\.\d{3} s") as caught:

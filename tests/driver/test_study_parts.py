@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from conftest import naming
-from hypothesis import given, settings, strategies as st
+from hypothesis import assume, given, settings, strategies as st
 from scipy.stats import loguniform, norm, uniform
 
 import thud
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from thud.base.key import Key
 
+SCALES = ["linear", "log"]
 DESIGNS = ("random", "latin_hypercube", "sobol")
 
 # Keys that may vary in any study: numbers, words and flags.
@@ -44,20 +45,14 @@ def parameters(draw: st.DrawFn) -> tuple[Key, dict[str, Any], float]:
         "real": st.floats(1e-3, 1e3), "whole": st.integers(1, 1000), "flag": st.booleans(),
         "choice": st.sampled_from(key.choices or ("",)),
     }  # fmt: skip
-    value, table = kinds[key.kind], dict[str, Any]()
-    forms = ["values", "low", "std"][: {"real": 3, "whole": 2}.get(key.kind, 1)]
-    form = draw(st.sampled_from(forms))
-    if form == "values":
-        table["values"] = draw(st.lists(value, min_size=1, max_size=5))
-    elif form == "low":
-        ends = draw(st.lists(value, min_size=2, max_size=2, unique=True))
-        table = {
-            "low": min(ends),
-            "high": max(ends),
-            "scale": draw(st.sampled_from(["linear", "log"])),
-        }
-    else:
-        table = {"std": draw(value), "mean": draw(value)}
+    value = kinds[key.kind]
+    forms = [
+        st.fixed_dictionaries({"values": st.lists(value, min_size=1, max_size=5)}),
+        st.fixed_dictionaries({"low": value, "high": value, "scale": st.sampled_from(SCALES)}),
+        st.fixed_dictionaries({"std": value, "mean": value}),
+    ][: {"real": 3, "whole": 2}.get(key.kind, 1)]
+    table: dict[str, Any] = draw(st.one_of(forms))
+    assume("low" not in table or table["low"] < table["high"])
     if key.kind != "real":
         return key, table, 1
     sizes = SIZES.get(key.unit, {key.unit: 1.0})
