@@ -26,17 +26,12 @@ MODAL: dict[str, Any] = {
 def test_margin_of_a_source_with_known_levels() -> None:
     # With a given contact time the level is 20 lg M + 10 lg h + c.
     options = {"contact_time": 0.02, "restitution": 0.8}
-    found = thud.design(
-        {
-            "fixed": {"model": "hunt_crossley", "source": "tyre", **options},
-            "parameters": {
-                "mass": {"low": 3, "high": 9, "count": 4},
-                "height": {"low": 0.4, "high": 1, "count": 3},
-            },
-        }
-    ).dataset
+    mass, height = np.linspace(3, 9, 4), np.linspace(0.4, 1, 3)
+    parameters = {"mass": {"values": mass}, "height": {"values": height}}
+    fixed = {"model": "hunt_crossley", "source": "tyre", **options}
+    found = thud.design({"fixed": fixed, "parameters": parameters}).dataset
     one = thud.solve(thud.Ball(mass=1), thud.Drop(1), "hunt_crossley", **options)
-    gain = 20 * np.log10(found["mass"]) + 10 * np.log10(found["height"])
+    gain = np.add.outer(20 * np.log10(mass), 10 * np.log10(height))
     expected = [
         np.minimum(level + gain - limit.lower, limit.upper - level - gain)
         for level, limit in zip(one.levels(), one.assess("tyre").criteria[:5], strict=True)
@@ -63,29 +58,26 @@ def test_case_is_marked() -> None:
 
 
 def test_scale_of_the_study_is_that_of_the_axes() -> None:
-    modulus = {"low": 1e5, "high": 1e8, "count": 7, "scale": "log"}
-    height = {"low": 1, "high": 2, "count": 2, "scale": "log"}
-    result = thud.design({"parameters": {"youngs_modulus": modulus, "height": height}})
-    figure = result.plot()
+    modulus = thud.Parameter(low=1e5, high=1e8, count=7, scale="log")
+    height = thud.Parameter(low=1, high=2, count=2, scale="log")
+    figure = thud.design({"youngs_modulus": modulus, "height": height}).plot()
     axes, _ = figure.axes
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
     # 1e8 Pa would need a power of ten beside the axis, over the legend.
     assert axes.get_xlabel() == "Young's modulus, MPa"
     assert axes.get_xlim() == pytest.approx((0.1, 100))
     figure.draw_without_rendering()
-    shown = [text.get_text() for text in axes.get_xticklabels()]
-    assert {"0.1", "1", "10", "100"} <= set(shown)
-    shown = [text.get_text() for text in axes.get_yticklabels()]
-    assert {"1", "1.2", "1.4"} <= set(shown)
+    for axis, expected in ((axes.xaxis, {"0.1", "1", "10", "100"}), (axes.yaxis, {"1", "1.4"})):
+        assert expected <= {text.get_text() for text in axis.get_ticklabels()}
     assert thud.design(MODAL).plot().axes[0].get_xscale() == "linear"
 
 
 def test_colours_of_a_map_without_conformity_end_at_zero() -> None:
-    heights = {"low": 0.1, "high": 0.5, "count": 4}
-    study = {"parameters": {"height": heights, "mass": {"values": [2.0, 2.5]}}}
-    axes, bar = thud.design(study).plot().axes
+    heights = thud.Parameter(low=0.1, high=0.5, count=4)
+    result = thud.design({"height": heights, "mass": [2.0, 2.5]})
+    axes, bar = result.plot().axes
     low, high = bar.get_ylim()
-    margin = thud.design(study).dataset["margin"].values
+    margin = result.dataset["margin"].values
     assert low <= margin.min()
     assert margin.max() < 0 == high
     # The zero is white, and round margins have lines, also in the bar.
@@ -99,15 +91,12 @@ def test_colours_of_a_map_without_conformity_end_at_zero() -> None:
 
 @pytest.mark.filterwarnings("error")
 def test_map_of_nearly_one_margin_is_drawn() -> None:
-    heights = {"low": 0.1, "high": 0.1001, "count": 2}
-    study = {"parameters": {"height": heights, "mass": {"values": [2.0, 2.0001]}}}
-    axes, _ = thud.design(study).plot().axes
+    axes, _ = thud.design({"height": [0.1, 0.1001], "mass": [2.0, 2.0001]}).plot().axes
     assert not axes.texts
 
 
 def test_places_without_results_stay_empty() -> None:
-    study = {"parameters": {"height": {"values": [0.5, 1, -1]}, "mass": {"values": [2, 3, 4]}}}
-    result = thud.design(study)
+    result = thud.design({"height": [0.5, 1, -1], "mass": [2, 3, 4]})
     assert int(np.isnan(result.dataset["margin"]).sum()) == 3
     result.plot()
     assert ("samples", "9") in result.rows()
@@ -204,6 +193,6 @@ def test_map_rounds_the_rating_as_the_verdict_does(
 
 
 def test_design_of_one_parameter_is_a_curve() -> None:
-    result = thud.design({"parameters": {"height": {"values": [0.9, 1, 1.1]}}})
+    result = thud.design({"height": [0.9, 1, 1.1]})
     (axes,) = result.plot().axes
     assert axes.get_lines()[0].get_ydata() == pytest.approx(result.dataset["margin"].values)

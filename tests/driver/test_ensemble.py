@@ -392,10 +392,9 @@ def test_model_replaces_that_of_the_case() -> None:
 def test_columns_of_a_table_are_parameters() -> None:
     pandas = pytest.importorskip("pandas", reason="the extra studies is not installed")
     columns = {"height": [0.5, 1.0], "momentum_flux": ["retarding", "none"]}
-    # Rows have any index.
+    # Rows have any index; without columns there is the drop of the case.
     found = thud.solve_many(pandas.DataFrame(columns, index=[7, 7]), model="hollow_sphere")
     expected = thud.solve_many(columns, model="hollow_sphere")
     assert list(found.parameters) == list(expected.parameters)
     np.testing.assert_array_equal(found.restitution, expected.restitution)
-    # Without columns there is the drop of the case.
     assert len(thud.solve_many(pandas.DataFrame(), model="hollow_sphere")) == 1

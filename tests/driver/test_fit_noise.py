@@ -243,6 +243,11 @@ def test_offset_and_tone_are_part_of_the_noise() -> None:
     under = np.asarray(fit.columns()["background_N"])
     # 80 ms of white noise of 5 N.
     assert under.mean() == pytest.approx(20, abs=FAR * 5 / np.sqrt(2 * QUIET * RATE))
+    # Also without noise.
+    time, force = pulse(QUIET)
+    fit = thud.fit((time, force + 20), TRUTH, CASE)
+    assert np.asarray(fit.columns()["background_N"]).mean() == pytest.approx(20, abs=0.1)
+    assert not fit.warnings
     fit = thud.fit(record("hum of 16.7 Hz, 10 N"), TRUTH, CASE)
     assert not fit.warnings
     assert (np.abs(pulls(fit)) < FAR).all()
@@ -255,13 +260,6 @@ def test_offset_and_tone_are_part_of_the_noise() -> None:
     assert note.others["frequency"] == 60
     # White noise of 5 N: the variance of an amplitude is 2/n times that of samples.
     assert note.value == pytest.approx(3.0, abs=FAR * 5 * np.sqrt(2 / (2 * QUIET * RATE)))
-
-
-def test_offset_of_a_record_without_noise_is_no_misfit() -> None:
-    time, force = pulse(QUIET)
-    fit = thud.fit((time, force + 20), TRUTH, CASE)
-    assert np.asarray(fit.columns()["background_N"]).mean() == pytest.approx(20, abs=0.1)
-    assert not fit.warnings
 
 
 def test_noise_makes_no_tone() -> None:

@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from conftest import REPOSITORY, SHELL
-from synthetic import cut_drops, make_recording, with_force
+from synthetic import make_recording, with_force
 
 import thud
-from thud.recordings.config import Config
-from thud.recordings.measured_drop import measure_stages
 from thud.recordings.recording import Recording, read_recording
 from thud.recordings.signal import Signal
 from thud.studies.fit import read_fit_study, run_fit
@@ -121,17 +119,10 @@ def test_slow_noise_of_fast_records_has_weights(shell: thud.Impact) -> None:
 
 
 def test_too_little_quiet_leaves_the_noise_to_the_residuals(shell: thud.Impact) -> None:
-    force, _ = make_recording(
-        pulse(shell), shell.sample_rate, before=0.006, after=0.006, noise_db=NOISE_DB
-    )
-    assert not ForceTarget(_measured(force, shell.sample_rate)).compare().known_noise
-
-
-def _measured(force: np.ndarray, rate: float) -> Recording:
-    """Return the recording of a force in memory."""
-    sections = cut_drops(Signal.from_array(force, rate))
-    drops = tuple(measure_stages(section, Config()).drop for section in sections)
-    return Recording("memory", drops, ())
+    force, rate = pulse(shell), shell.sample_rate
+    force, _ = make_recording(force, rate, before=0.006, after=0.006, noise_db=NOISE_DB)
+    record = thud.read_recording(Signal.from_array(force, rate))
+    assert not ForceTarget(record).compare().known_noise
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -83,26 +83,30 @@ def test_shortened_steps_are_stated() -> None:
 
 def test_reduced_step_of_an_unstable_run_is_stated() -> None:
     # The bound on the step is closest for elements that are flat along the wall.
-    options = {"radial_elements": 16, "polar_elements": 16, "step_safety": 0.98}
+    options: dict[str, Any] = {"radial_elements": 16, "polar_elements": 16, "step_safety": 0.98}
     options |= {"fractional_order": 0.3, "loss_factor": 0.143}
-    keys = {"ball": thud.Ball(youngs_modulus=2.08e6), "model": "finite_element", **options}
-    quantities = thud.solve(**keys).model_quantities  # type: ignore[arg-type]
+    options |= {"ball": thud.Ball(youngs_modulus=2.08e6), "model": "finite_element"}
+    quantities = thud.solve(**options).model_quantities
     assert "reduced_step_safety" not in quantities
-    quantities = thud.solve(drop=thud.Drop(height=5.0), **keys).model_quantities  # type: ignore[arg-type]
+    quantities = thud.solve(drop=thud.Drop(height=5.0), **options).model_quantities
     assert quantities["reduced_step_safety"] == pytest.approx(0.49)
 
 
 def test_run_that_breaks_down_by_its_step_is_repeated() -> None:
     """It ended with a surface too deep in the layer, though half the step computes it."""
     ball = thud.Ball(0.0905, wall_thickness=0.01138, mass=1.2264, youngs_modulus=686214.0)
-    options = {"radial_elements": 3, "polar_elements": 32, "layer_stiffness": 1.2e10}
+    options: dict[str, Any] = {
+        "radial_elements": 3,
+        "polar_elements": 32,
+        "layer_stiffness": 1.2e10,
+    }
     options |= {"viscosity": "constant_loss", "loss_factor": 0.1, "law": "mooney_rivlin"}
-    impact = thud.solve(ball, thud.Drop(10.79), "finite_element", duration=0.3, **options)  # type: ignore[arg-type]
+    impact = thud.solve(ball, thud.Drop(10.79), "finite_element", duration=0.3, **options)
     assert impact.model_quantities["reduced_step_safety"] < 0.85
     assert impact.energy_residual < 5e-3
 
 
-VERIFIED = {
+VERIFIED: dict[str, dict[str, Any]] = {
     "shell": {"model": "hollow_sphere", "sample_rate": 8000.0},
     "modes of the user": {"model": "modal_ball", "rings": 20, "highest_frequency": 800.0},
     "elements of the user": {"model": "finite_element", "polar_elements": 24},
@@ -111,8 +115,8 @@ VERIFIED = {
 
 @pytest.mark.parametrize("name", VERIFIED)
 def test_verification_is_a_drop_at_a_finer_resolution(name: str) -> None:
-    impact = thud.solve(**VERIFIED[name], verify=True)  # type: ignore[arg-type]
-    plain = thud.solve(**VERIFIED[name])  # type: ignore[arg-type]
+    impact = thud.solve(**VERIFIED[name], verify=True)
+    plain = thud.solve(**VERIFIED[name])
     assert not any(name.startswith("finer") for name in plain.model_quantities)
     quantities = impact.model_quantities
     finer = {name[6:]: quantities[name] for name in quantities if name.startswith("finer_")}
@@ -198,8 +202,8 @@ def test_elements_refine_themselves_or_state_the_error(name: str) -> None:
     options = {"viscosity": "none"} if name == "no losses" else {}
 
     def solved(**mesh: int) -> thud.Impact:
-        keywords = {"model": "finite_element", "duration": 0.12, **options, **mesh}
-        return thud.solve(thud.Ball(**keys, mass=mass), thud.Drop(height=0.25), **keywords)  # type: ignore[arg-type]
+        keywords: Any = {"model": "finite_element", "duration": 0.12, **options, **mesh}
+        return thud.solve(thud.Ball(**keys, mass=mass), thud.Drop(height=0.25), **keywords)
 
     impact, finer = solved(), solved(radial_elements=18, polar_elements=168)
     coarse = solved(radial_elements=8, polar_elements=64)
@@ -256,6 +260,6 @@ def test_short_record_is_found_at_the_coarsest_mesh() -> None:
     with pytest.raises(thud.InputError, match=r"at least 0\.\d{3} s") as caught:
         thud.solve(soft, model="finite_element")
     needed = float(str(caught.value).split()[-2])
-    keys = {"radial_elements": 2, "polar_elements": 16}
-    impact = thud.solve(soft, duration=1.02 * needed, model="finite_element", **keys)  # type: ignore[arg-type]
+    coarse = thud.FiniteElement(radial_elements=2, polar_elements=16)
+    impact = thud.solve(soft, duration=1.02 * needed, model=coarse)
     assert impact.restitution > 0

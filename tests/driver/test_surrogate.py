@@ -333,15 +333,10 @@ def test_map_shows_undecided_verdicts(trained: thud.Surrogate) -> None:
 
 
 def test_figure_shows_held_out_errors(trained: thud.Surrogate) -> None:
-    figure = trained.plot()
-    (axes,) = figure.axes
-    labels = [label.get_text() for label in axes.get_yticklabels()]
-    assert labels == [
-        "Contact time", "Restitution",
-        *(f"Level {band} Hz" for band in ("31.5", "63", "125", "250", "500")),
-    ]  # fmt: skip
+    (axes,) = trained.plot().axes
     shown = [line.get_xdata() for line in axes.lines if len(line.get_xdata()) == 64]
-    np.testing.assert_array_equal(shown[-1], trained.residuals[:, trained.assessed][:, -1])
+    assessed = trained.residuals[:, trained.assessed]
+    np.testing.assert_array_equal(shown, assessed.T)
 
 
 def test_fewest_drops_are_those_of_the_order_statistic() -> None:
