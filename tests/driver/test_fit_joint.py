@@ -40,16 +40,13 @@ CASE = thud.Case(
 TRUTH = {"youngs_modulus": 1.8e6, "mass": 2.5}
 STUDY = """
 fixed = { duration = 0.03, model = "hollow_sphere" }
-
 [[target]]
 file = "drop_1.csv"
 fixed = { height = { value = 10, unit = "cm" } }
-
 [[target]]
 file = "drop_2.csv"
 fixed = { height = 1.0 }
 gain = 0.02
-
 [parameters]
 youngs_modulus = { start = 1.6, unit = "MPa" }
 mass = { start = 2.4 }

@@ -29,15 +29,9 @@ COARSE = thud.FiniteElement(
 )
 CASE = thud.Case(ball=thud.Ball(youngs_modulus=2.08e6), model=COARSE)
 STUDY = """
-[case.model]
-name = "hollow_sphere"
-
-[target]
-file = "{file}"
-{more}
-
-[parameters]
-youngs_modulus = {{ start = 1.4, unit = "MPa" }}
+case.model.name = "hollow_sphere"
+target = {{ file = "{file}"{more} }}
+parameters.youngs_modulus = {{ start = 1.4, unit = "MPa" }}
 """
 
 
@@ -139,8 +133,8 @@ def two(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize(
     ("file", "more", "truth"),
-    [("record.wav", "", 1.6e6), ("record.wav", "drop = 2", 1.8e6),
-     ("record.csv", "drop = 2", 1.8e6)],
+    [("record.wav", "", 1.6e6), ("record.wav", ", drop = 2", 1.8e6),
+     ("record.csv", ", drop = 2", 1.8e6)],
 )  # fmt: skip
 def test_studies_read_recordings_and_choose_the_drop(
     two: Path, file: str, more: str, truth: float

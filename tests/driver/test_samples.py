@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 CASE = """&case name = 'ball' / &ball mass = 2.45 / &drop height = 1.0 /
 &model name = 'hollow_sphere' /
 """
-
 # Mass and other keys of a rubber ball that conforms by its floor force alone.
 CONFORMING = "2.59, outer_radius = 0.06105, gauge_pressure = 17.8e3"
 
