@@ -2,38 +2,26 @@
 
 from __future__ import annotations
 
-import shlex
-import subprocess
-import sysconfig
-from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from math import inf, nan
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 import thud
 from thud.level.levels import peak_count
-from thud.studies.calibrated_set import assess as calibrated
-from thud.studies.fit import read_fit_study, run_fit
-from thud.studies.run import evaluate
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 # What is only imported for the table.
-__all__ = [
-    "ThreadPoolExecutor", "calibrated", "evaluate", "inf", "nan", "np", "peak_count",
-    "read_fit_study",
-]  # fmt: skip
+__all__ = ["inf", "nan", "np", "peak_count"]
 
+FREQUENCY = np.linspace(10, 1000, 300)
+POINT = thud.mobility(thud.Oscillator(), FREQUENCY).values
+OCTAVES = (63, 125, 250, 500)
 PULSE = np.sin(np.pi * np.linspace(0, 1, 883))
-SHELL = "&ball / &drop / &model name = 'hollow_sphere' /"
-CONTACT_TIME = "contact_time = {value = 20, uncertainty = 1, unit = 'm'}"
-# Deflections of a press, m.
-FIVE = [0, 1e-3, 2e-3, 3e-3, 4e-3]
-LARGE = {"low": 1, "high": 2, "count": 257}
-HEIGHTS = {"parameters": {"height": {"values": [0.5, 1.0]}}}
 
 
 def write(name: str, text: str | bytes) -> Path:
@@ -53,106 +41,93 @@ def assess(**change: Any) -> thud.Verdict:  # noqa: ANN401
     return thud.assess_levels(**({"levels": [39, 31, 23, 17, 12.5]} | change))
 
 
-def study(tables: str | bytes, varied: str = "height.values = [1]") -> thud.Study:
-    """Read the file of a study with varied parameters."""
-    head = tables if isinstance(tables, bytes) else tables.encode()
-    entry = f"parameters = {varied}" if varied.startswith("{") else f"parameters.{varied}"
-    return thud.read_study(write("study.toml", head + b"\n" + entry.encode()))
+def solved(text: str) -> thud.Impact:
+    """Return the impact of a case in a file."""
+    return thud.solve(thud.read_case(write("case.nml", text)))
 
 
-def heated(law: str, model: str = "modal_ball", more: str = "") -> thud.Study:
-    """Read the file of a study in which the temperature varies."""
-    tables = f"fixed.model = {model!r}\ntemperature = {{{law}}}"
-    return study(tables, f"temperature.values = [1]\n{more and f'parameters.{more}'}")
+def below(room: str = "", floor: str = "name = 'plate'", plate: str = "") -> thud.Impact:
+    """Return the impact on a plate above a room, with keys of the groups in a file."""
+    return solved(f"&floor {floor} /\n&plate\n {plate} /\n&room {room} /\n")
 
 
-def many(parameters: Any = None, **options: Any) -> thud.Ensemble:  # noqa: ANN401
-    """Solve samples."""
-    return thud.solve_many({} if parameters is None else parameters, **options)
+@cache
+def predicted() -> thud.RoomPrediction:
+    """Return the level of a ball below a plate."""
+    return thud.predict_level(thud.solve(model="hollow_sphere"), thud.Plate(), thud.Room())
 
 
-def samples(table: str = "height\n1\n", case: str = SHELL, arguments: str = "") -> NoReturn:
-    """Run the executable with a table of samples that is refused; raise what it says."""
-    write("table.csv", table)
-    write("ball.nml", case)
-    executable = Path(sysconfig.get_path("scripts")) / "thud"
-    command = [executable, "ball.nml", *shlex.split(arguments or "--samples table.csv")]
-    result = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
-    assert result.returncode == 1
-    assert not Path("outputs/ball_samples").exists()
-    raise thud.InputError(result.stderr.splitlines()[0] if arguments else result.stderr.strip())
+def floor_study() -> dict[str, Any]:
+    """Return a study of a drop on a floor."""
+    case = write("case.nml", "&model /\n&floor name = 'plate' /\n")
+    heights = {"low": 0.5, "high": 1.0}
+    return {"case": str(case), "design": {"size": 64}, "parameters": {"height": heights}}
 
 
-def record() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return time and force of a drop, with noise and 0.1 s of quiet on both sides."""
-    impact = thud.solve(model="hollow_sphere", duration=0.03)
-    force = np.pad(impact.floor_force, 4410)
-    force += np.random.default_rng(1).normal(size=len(force))
-    return np.arange(len(force)) / impact.sample_rate, force
+def construction_file(old: str, new: str) -> thud.Construction:
+    """Return a construction of a file in which a text is replaced."""
+    text = """name = "mine"
+kind = "concrete"
+floor = "plate"
+layers = [
+  { material = "concrete", thickness = 0.2, density = 2400 },
+  { material = "gypsum board", thickness = 0.0125, density = 960 }]
+
+[keys]
+thickness = { value = 0.2, source = "drawing" }
+density = { value = 2400, source = "estimate" }
+
+[room]
+ceiling_mass = { value = 12, source = "data sheet" }
+"""
+    assert old in text
+    return thud.construction(write("mine.toml", text.replace(old, new)))
 
 
-def fitted(parameters: Any = ("mass",), target: Any = None, **options: Any) -> thud.Fit:  # noqa: ANN401
-    """Fit to a target, by default the record with options of a target."""
-    own = {name: options.pop(name) for name in vars(thud.ForceTarget) if name in options}
-    own |= {name: options.pop(name) for name in ("gain", "noise", "fixed") if name in options}
-    case = options.pop("case", thud.Case(model=thud.HollowSphere()))
-    target = thud.ForceTarget(record(), **own) if target is None else target
-    return thud.fit(target, parameters, case, **options)
+def room_levels(text: str | bytes) -> thud.RoomLevels:
+    """Return levels in a room of a table."""
+    return thud.read_room_levels(write("levels.csv", text))
 
 
-def fit_study(
-    target: str = "file = 'record.csv'",
-    more: str = "",
-    *,
-    head: str = "",
-    parameters: str = "youngs_modulus = {}",
-) -> thud.Fit:
-    """Run the file of a fit to a record."""
-    np.savetxt("record.csv", np.column_stack(record()), delimiter=",")
-    write("record.wav", b"RIFF")
-    case = "case.model.name = 'hollow_sphere'" if "case" not in head else ""
-    tables = target if "[[" in target else f"[target]\n{target}\n{more}"
-    text = f"{case}\n{head}\n{tables}\n[parameters]\n{parameters}"
-    return run_fit(str(write("study.toml", text)))
+def titled(titles: str, cells: str = "") -> thud.RoomLevels:
+    """Return levels in a room of a table with equal cells in each octave, by default of 50."""
+    cells = cells or ";".join(["50"] * titles.count(";"))
+    return room_levels("\n".join([titles, *(f"{octave};{cells}" for octave in OCTAVES)]))
 
 
-def joint(second: str) -> thud.Fit:
-    """Run the file of a fit to two records, of which the second has keys."""
-    target = "[[target]]\nfile = 'record.csv'\n"
-    return fit_study(f"{target}fixed.height = 1\n{target}{second}", parameters="mass = {}")
+def octaves(*rows: str) -> thud.RoomLevels:
+    """Return levels at one position of a table with some rows in place of others."""
+    known = {row.partition(",")[0]: row for row in (*(f"{octave},60" for octave in OCTAVES), *rows)}
+    return room_levels("\n".join(["frequency,P1", *filter(None, known.values())]))
 
 
-def wide_record() -> thud.Fit:
-    """Fit to a record with too many values below the greatest frequency."""
-    time = np.arange(100_000) / 1e4
-    return fitted(
-        window=(0.0, 10.0),
-        target=thud.ForceTarget((time, np.exp(-((time - 5) ** 2) / 1e-5)), window=(0.0, 10.0)),
-    )
+def fit_points(frequency: Any = FREQUENCY, values: Any = POINT, **options: Any) -> thud.MobilityFit:  # noqa: ANN401
+    """Return the fit of points of a mobility."""
+    return thud.fit_mobility(thud.Mobility(frequency, values), **options)
 
 
-def pressed(deflection: Any, force: Any, **options: Any) -> thud.Fit:  # noqa: ANN401
-    """Fit to a curve of a press."""
-    values = list(force) if isinstance(force, range) else force
-    return thud.fit(thud.CompressionTarget(deflection, values, **options), ["youngs_modulus"])
+def mobility_table(titles: str, *arguments: Any) -> thud.Mobility:  # noqa: ANN401
+    """Return the mobility of a table with a row of numbers."""
+    row = ",".join(["1"] * (titles.count(",") + 1))
+    return thud.read_mobility(write("point.csv", f"{titles}\n{row}\n"), *arguments)
 
 
-def unknown(model: Any = None, **change: Any) -> object:  # noqa: ANN401
-    """Assess the ball with unknowns."""
-    unknowns = {"key": ("friction", "fractional_order"), "low": (0.0, 0.2), "high": (0.5, 1.0),
-                "reason": ("it is dry", "not measured")} | change  # fmt: skip
-    model = model or thud.FiniteElement(radial_elements=2, polar_elements=16)
-    return calibrated(thud.Case(model=model, unknowns=thud.Unknowns(**unknowns)))
+def modal_floor(line: int = 0, old: str = "", new: str = "", **changes: Any) -> thud.Mobility:  # noqa: ANN401
+    """Return the mobility of a slab by two modes of a file, of which a line may be changed.
 
-
-def unknown_text(key: str) -> thud.Case:
-    """Read the keys of unknowns from a namelist."""
-    text = f"&unknowns key = {key} / &model name = 'finite_element' /"
-    return thud.read_case(write("case.nml", text))
-
-
-def learned(**change: Any) -> thud.Surrogate:  # noqa: ANN401
-    """Train a surrogate."""
-    tables = {"design": {"size": 64}, "fixed": {"model": "modal_ball"}}
-    tables |= {name: change.pop(name) for name in tables if name in change}
-    return thud.surrogate({**tables, "parameters": change or {"height": {"low": 1, "high": 2}}})
+    Its plate has 414 kg/m2, and natural frequencies of 29.1 and 57.9 Hz.
+    """
+    x, y = np.linspace(0, 5, 11), np.linspace(0, 4, 9)
+    across = np.sin(np.pi * y / 4)
+    shape = np.array([np.outer(np.sin(m * np.pi * x / 5), across) for m in (1, 2)])
+    modes = {
+        "frequency": [29.1, 57.9], "loss_factor": 0.03, "x": x, "y": y,
+        "shape": shape / np.sqrt(414 * 5), **changes,
+    }  # fmt: skip
+    thud.write_floor_modes("modes.csv", **modes)
+    lines = Path("modes.csv").read_text("utf-8").splitlines()
+    assert old in lines[line]
+    lines[line] = lines[line].replace(old, new, 1)
+    write("modes.csv", "\n".join(lines))
+    floor = thud.ModalFloor(file="modes.csv", thickness=0.18, density=2300.0, wave_speed=3500.0)
+    return thud.mobility(floor, [30.0])
