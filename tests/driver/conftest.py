@@ -19,12 +19,16 @@ from hypothesis import settings
 
 import thud
 from thud import cli
+from thud.base.bridge import ask
+from thud.case.case import case_text
 from thud.recordings.config import Config
 from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
     from types import ModuleType
+
+    from numpy.typing import NDArray
 
     from thud.base.note import Note
 
@@ -88,6 +92,14 @@ def noted(notes: Iterable[Note], code: str) -> Note:
     """Return the only note of a code."""
     (note,) = (note for note in notes if note.code == code)
     return note
+
+
+def frequencies_of(
+    floor: thud.FloorOptions, highest: float, room: thud.Room | None = None
+) -> NDArray[np.float64]:
+    """Return natural frequencies of a floor, Hz."""
+    case = thud.Case(floor=floor, room=room)
+    return np.asarray(ask("floor_modes", case=case_text(case), highest=highest)["frequency"])
 
 
 def quiet_fit(*arguments: Any, **options: Any) -> thud.Fit:  # noqa: ANN401 - of fit

@@ -57,11 +57,11 @@ def predicted() -> thud.RoomPrediction:
     return thud.predict_level(thud.solve(model="hollow_sphere"), thud.Plate(), thud.Room())
 
 
-def floor_study() -> dict[str, Any]:
-    """Return a study of a drop on a floor."""
+def floor_study(*size: int, **heights: Any) -> dict[str, Any]:  # noqa: ANN401
+    """Return a study of drops on a floor."""
     case = write("case.nml", "&model /\n&floor name = 'plate' /\n")
-    heights = {"low": 0.5, "high": 1.0}
-    return {"case": str(case), "design": {"size": 64}, "parameters": {"height": heights}}
+    design = {"size": size[0]} if size else {}
+    return {"case": str(case), "design": design, "parameters": {"height": heights}}
 
 
 def construction_file(old: str, new: str) -> thud.Construction:

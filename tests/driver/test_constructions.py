@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 import tomllib
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY, names_in, naming
+from conftest import REPOSITORY, names_in
+from refused import construction_file, write
 from test_figure_look import assert_clean
 
 import thud
@@ -17,11 +19,6 @@ from thud import cli
 from thud.base import files
 from thud.case.constructions import CEILING_KEYS
 from thud.report.predicted_floor import PredictedFloor
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from conftest import ErrorsOf
 
 FILES = sorted((REPOSITORY / "inputs/constructions").glob("*.toml"))
 # What a source must name, unless the value is nominal or says that it is an estimate.
@@ -31,23 +28,9 @@ CITED = {
     "EN 312", "EN 338", "EN 1168", "EN 13747", "EN 1991-1-1", "EN 1995-1-1", "EN 29052-1",
     "ISO 12354", "ISO 12354-1", "DIN 18560-2",
 }  # fmt: skip
-MINE = """\
-name = "mine"
-kind = "concrete"
-floor = "plate"
-layers = [
-  { material = "concrete", thickness = 0.2, density = 2400 },
-  { material = "gypsum board", thickness = 0.0125, density = 960 }]
-
-[keys]
-thickness = { value = 0.2, source = "drawing" }
-density = { value = 2400, source = "estimate" }
-
-[room]
-ceiling_mass = { value = 12, source = "data sheet" }
-"""
 
 
+@cache
 def level_below(name: str) -> float:
     """Return the rating below a construction, by the fastest model of the ball."""
     case = replace(thud.construction(name).case(), model=thud.HollowSphere())
@@ -131,6 +114,7 @@ def test_construction_agrees_with_the_case_of_this_floor(name: str, case: str) -
         ["concrete 200", *(f"concrete 200, screed on {s} MN/m3" for s in (20, 15, 10, 6))],
         ["concrete 200, screed on 10 MN/m3", "concrete 200, screed 70 on 10 MN/m3"],
         [f"hollow core {h}" for h in (200, 265, 320)],
+        ["hollow core 200", "concrete 200"],
         *(
             pytest.param(names, marks=pytest.mark.slow)
             for names in (
@@ -152,11 +136,6 @@ def test_heavier_and_softer_floors_are_quieter(names: list[str]) -> None:
     assert levels[0] > levels[-1] + 0.4
 
 
-def test_solid_slab_is_quieter_than_hollow_cores_of_its_depth() -> None:
-    assert level_below("concrete 200") < level_below("hollow core 200") - 3
-    assert level_below("filigree slab 200") == level_below("concrete 200")
-
-
 def test_case_has_source_and_room_of_another() -> None:
     """A stated ceiling was lost without a word: 12 dB."""
     room = thud.Room(volume=30.0, ceiling_mass=15.0, ceiling_depth=0.3)
@@ -170,8 +149,6 @@ def test_case_has_source_and_room_of_another() -> None:
     assert with_ceiling.room == replace(
         thud.Room(volume=30.0), ceiling_mass=9.0, ceiling_depth=0.2, ceiling_loss_factor=0.3
     )
-    with pytest.raises(TypeError, match="Case"):
-        thud.construction("concrete 180").case("concrete_180.nml")  # type: ignore[arg-type]
 
 
 def test_library_is_filtered_by_words() -> None:
@@ -188,14 +165,16 @@ def test_library_is_filtered_by_words() -> None:
     thud.construction(name).sources.clear()
     last = thud.construction(name)
     assert (last.room["ceiling_mass"], last.sources["ceiling_mass"][:8]) == (9.0, "estimate")
-    assert thud.constructions("concrete 180 ceiling")[name] == last
+    assert thud.constructions("CONCRETE 180  ceiling")[name] == last
+    for one in (last, name):
+        assert one in thud.constructions("concrete 180,  Ceiling")
+    assert last not in thud.constructions("timber")
+    assert thud.construction("Concrete 180 Screed on 15 mn/m3,  ceiling") == last
     assert f"{last.mass_per_area:.0f}" == "526"
     assert last.section.split(", ") == [
         "50 mm cement screed", "20 mm mineral wool", "180 mm concrete",
         "200 mm cavity with absorber", "12.5 mm gypsum board",
     ]  # fmt: skip
-    with pytest.raises(thud.InputError, match=naming("marble", "timber joists")):
-        thud.constructions("marble")
 
 
 def test_section_is_to_scale_and_names_each_layer() -> None:
@@ -216,44 +195,15 @@ def test_section_is_to_scale_and_names_each_layer() -> None:
     assert bar.width == pytest.approx(0.2 * scale, rel=0.02)
 
 
-def test_file_of_a_user_is_a_construction(tmp_path: Path) -> None:
-    path = tmp_path / "mine.toml"
-    path.write_text(MINE)
-    for source in (path, str(path)):
-        entry = thud.construction(source)
-        assert entry.floor == thud.Plate(thickness=0.2, density=2400)
-        assert entry.room == {"ceiling_mass": 12.0}
-        assert entry.sources["thickness"] == "drawing"
-        assert entry.note == ""
+@pytest.mark.usefixtures("working_directory")
+def test_file_of_a_user_is_a_construction() -> None:
+    entry = construction_file("", "")
+    assert entry == thud.construction("mine.toml")
+    assert entry.floor == thud.Plate(thickness=0.2, density=2400)
+    assert entry.room == {"ceiling_mass": 12.0}
+    assert entry.sources["thickness"] == "drawing"
+    assert entry.note == ""
     assert "mine" not in thud.constructions()
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "parts"),
-    [
-        ('name = "mine"\n', "", ("name", "missing")), ('"concrete"\n', '""\n', ("kind", "missing")),
-        ('floor = "plate"', 'floor = "plat"', ("floor", "plat", "plate")),
-        ('floor = "plate"', 'flor = "plate"', ("flor", "floor")),
-        ("thickness = { value", "thicknes = { value", ("thicknes", "thickness")),
-        ("value = 0.2,", "value = 9,", ("plate", "thickness", 9, "2 m")),
-        (', source = "drawing"', "", ("thickness", "source")),
-        ('"drawing"', '" "', ("thickness", "source", "text")),
-        ("ceiling_mass", "volume", ("room", "volume", "ceiling_mass")),
-        ("[room]\n", "[rooms]\n", ("rooms", "room")), ("[keys]\n", "[keys\n", ("TOML",)),
-        ("density = 960 }]", "density = 0 }]", ("layer", 2, "density", 0)),
-        (", density = 960 }]", "}]", ("layer", 2, "density")),
-    ],
-    ids=lambda value: str(value)[:20],
-)  # fmt: skip
-def test_bad_file_is_refused_in_one_sentence(
-    old: str, new: str, parts: tuple[object, ...], tmp_path: Path
-) -> None:
-    path = tmp_path / "mine.toml"
-    assert old in MINE
-    path.write_text(MINE.replace(old, new))
-    with pytest.raises(thud.InputError, match=naming(path, "allowed", *parts)) as caught:
-        thud.construction(path)
-    assert "\n" not in str(caught.value)
 
 
 def test_file_of_the_page_is_a_construction(tmp_path: Path) -> None:
@@ -267,16 +217,14 @@ def test_file_of_the_page_is_a_construction(tmp_path: Path) -> None:
     )
 
 
-def test_command_compares_constructions_beside_cases(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+@pytest.mark.usefixtures("working_directory")
+def test_command_compares_constructions_beside_cases(capsys: pytest.CaptureFixture[str]) -> None:
     case = thud.Case(name="first", floor=thud.Plate(thickness=0.2), room=thud.Room(volume=30.0))
-    thud.write_case(case, tmp_path / "first.nml")
-    (tmp_path / "mine.toml").write_text(f'note = "for tests"\n{MINE}')
-    options = ["--construction", "concrete 200", "--construction", str(tmp_path / "mine.toml")]
-    out = tmp_path / "out"
-    assert cli.main(["floor", str(tmp_path / "first.nml"), *options, "-o", str(out)]) == 0
-    assert {"floors.html", "floors.svg"} <= set(names_in(out))
+    thud.write_case(case, "first.nml")
+    construction_file("kind =", 'note = "for tests"\nkind =')
+    options = ["--construction", "concrete 200", "--construction", "mine.toml", "-o", "out"]
+    assert cli.main(["floor", "first.nml", *options]) == 0
+    assert {"floors.html", "floors.svg"} <= set(names_in(Path("out")))
     printed = capsys.readouterr()
     assert "mine: for tests" in printed.err
     (names,) = [line.split() for line in printed.out.splitlines() if "first" in line]
@@ -299,14 +247,6 @@ def test_command_lists_constructions(capsys: pytest.CaptureFixture[str]) -> None
     assert len(capsys.readouterr().out.splitlines()) == 2
 
 
-def test_command_refuses_what_is_no_floor(errors_of: ErrorsOf) -> None:
-    for arguments, word in (
-        ((), "--list"), (("--construction", "concrete 180") * 2, "'concrete 180'"),
-        (("--list", "marble"), "marble"),
-    ):  # fmt: skip
-        assert word in errors_of("floor", *arguments)
-
-
 def test_inputs_of_a_clone_are_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     module = tmp_path / "driver/thud/base/files.py"
     monkeypatch.setattr(files, "__file__", str(module))
@@ -315,21 +255,23 @@ def test_inputs_of_a_clone_are_found(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert files.inputs_folder() == tmp_path / "driver/thud/inputs"
 
 
-def test_construction_has_the_sides_of_the_case() -> None:
-    deck = thud.construction("concrete 180")
-    plate = thud.Plate(length=7.0, width=6.0)
-
-    def sides(floor: thud.Plate | None, **room: float) -> tuple[float, float]:
-        case = deck.case(thud.Case(floor=floor, room=thud.Room(**room)))  # type: ignore[arg-type]
-        assert isinstance(case.floor, thud.Plate)
-        thud.case.case.check_case(case)
-        return case.floor.length, case.floor.width
-
-    assert sides(None) == (5.0, 4.0)
-    for floor in (None, plate):
-        assert sides(floor, length=6.2, width=5.0) == (6.2, 5.0)
-    for room in ({}, {"length": 6.2}, {"length": 6.2, "width": 5.0, "corner_x": 0.5}):
-        assert sides(plate, **room) == (7.0, 6.0)
+@pytest.mark.parametrize(
+    ("floor", "room", "expected"),
+    [
+        (None, {}, (5.0, 4.0)),
+        (None, {"length": 6.2, "width": 5.0}, (6.2, 5.0)),
+        (thud.Plate(length=7.0, width=6.0), {"length": 6.2, "width": 5.0}, (6.2, 5.0)),
+        *((thud.Plate(length=7.0, width=6.0), room, (7.0, 6.0)) for room in (
+            {}, {"length": 6.2}, {"length": 6.2, "width": 5.0, "corner_x": 0.5})),
+    ],
+)  # fmt: skip
+def test_construction_has_the_sides_of_the_case(
+    floor: thud.Plate | None, room: dict[str, float], expected: tuple[float, float]
+) -> None:
+    case = thud.construction("concrete 180").case(thud.Case(floor=floor, room=thud.Room(**room)))  # type: ignore[arg-type]
+    assert isinstance(case.floor, thud.Plate)
+    thud.case.case.check_case(case)
+    assert (case.floor.length, case.floor.width) == expected
 
 
 @pytest.mark.parametrize(
@@ -352,9 +294,6 @@ def test_room_never_turns_joists(
     case = thud.construction(path).case(thud.Case(room=thud.Room(**room)))  # type: ignore[arg-type]
     assert isinstance(case.floor, thud.JoistFloor)
     assert (case.floor.length, case.floor.width) == expected
-    if min(room["length"], room["width"]) > expected[0]:
-        with pytest.raises(thud.InputError, match=naming("room", "length", 4.5, 4.2)):
-            thud.predict_level(floor=thud.construction(path), room=thud.Room(**room))  # type: ignore[arg-type]
     # Joists of a case remain as they are.
     other = thud.Case(floor=thud.JoistFloor(length=5.0, width=4.0), room=thud.Room())
     floor = thud.construction("joists, 2 boards").case(other).floor
@@ -371,51 +310,26 @@ def test_prediction_on_a_construction_has_its_floor_and_the_sides_of_the_case() 
     assert ("length of the floor", "6.2 m", "that of the case") in rows
 
 
-def test_room_alone_is_that_of_the_constructions(tmp_path: Path, errors_of: ErrorsOf) -> None:
-    path = tmp_path / "room.nml"
-    path.write_text("&room length = 6.2 width = 5 /\n")
-    options = ["--construction", "concrete 180", "-q", "-o", str(tmp_path / "out")]
-    assert cli.main(["predict", str(path), *options]) == 0
-    assert "room," not in (tmp_path / "out/ratings.csv").read_text(encoding="utf-8")
-    assert "&floor" in errors_of("predict", path)
-    assert "&floor" in errors_of("run", path)
-
-
-def test_room_larger_than_its_floor_names_the_floor(tmp_path: Path, errors_of: ErrorsOf) -> None:
-    path = tmp_path / "large.nml"
-    for keys, words in (
-        ("length = 6.2", ("6.2 m", "5.0 m", "length")),
-        ("width = 4.5", ("4.5 m", "4.0 m", "width")),
-        ("length = 4.5 corner_x = 1", ("corner_x", "5.5 m")),
-    ):
-        path.write_text(f"&floor name = 'plate' /\n&plate /\n&room {keys} /\n")
-        assert re.search(naming("floor", *words), errors_of("floor", path))
+@pytest.mark.usefixtures("working_directory")
+def test_room_alone_is_that_of_the_constructions() -> None:
+    write("room.nml", "&room length = 6.2 width = 5 /\n")
+    options = ["--construction", "concrete 180", "-q", "-o", "out"]
+    assert cli.main(["predict", "room.nml", *options]) == 0
+    # The sides are those of the floor: no note on the room.
+    assert "room," not in Path("out/ratings.csv").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(
-    ("name", "error", "words"),
-    [
-        ("conrete 180", thud.InputError, naming("conrete 180", "concrete 180", "TOML")),
-        (3, TypeError, naming("construction", "str")),
-        ("missing.toml", thud.InputError, naming("missing.toml", "allowed")),
-        ("latin.toml", thud.InputError, naming("latin.toml", "allowed")),
-    ],
+    "path", sorted((REPOSITORY / "inputs/floors").glob("*.nml")), ids=lambda path: path.stem
 )
-def test_what_is_no_construction_is_refused(
-    name: str, error: type[Exception], words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "latin.toml").write_bytes('name = "für"'.encode("latin-1"))
-    with pytest.raises(error, match=words):
-        thud.construction(name)
-
-
-@pytest.mark.parametrize(
-    "name", ["Concrete 180 Screed on 15 MN/m3", "CONCRETE 180,  screed on 15 mn/m3"]
-)
-def test_names_ignore_case_and_commas(name: str) -> None:
-    entry = thud.construction(name)
-    assert entry.name == "concrete 180, screed on 15 MN/m3"
-    for entry_or_name in (entry, entry.name):
-        assert entry_or_name in thud.constructions(name)
-        assert entry_or_name not in thud.constructions("timber")
+def test_inputs_of_floors_say_where_their_values_come_from(path: Path) -> None:
+    case = thud.read_case(path)
+    assert case.floor is not None
+    assert np.isfinite(thud.mobility(case.floor, [31.5, 500.0]).values).all()
+    group = path.read_text().partition(f"&{case.floor.name}\n")[2].partition("\n/")[0]
+    values = [
+        line for line in group.splitlines() if "=" in line and not line.strip().startswith("!")
+    ]
+    bare = [line.split()[0] for line in values if "!" not in line]
+    # A size follows the one above it; a choice says itself, a comment above may tell of a ratio.
+    assert set(bare) <= {"width", "thickness", "edges", "source_on", "stiffness_ratio"}

@@ -7,26 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from conftest import frequencies_of
 from scipy.optimize import brentq
 
 import thud
-from thud.base.bridge import ask
-from thud.case.case import case_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
-
 CONCRETE = thud.Plate(thickness=0.16, loss_factor=0.03, edges="absorption")
-
-
-def frequencies_of(floor: thud.FloorOptions, highest: float = 200.0) -> Array:
-    """Return natural frequencies, Hz."""
-    case = thud.Case(floor=floor)
-    return np.asarray(ask("floor_modes", case=case_text(case), highest=highest)["frequency"])
 
 
 def get_beam_root(compression: float, rotation: float) -> float:
@@ -71,12 +60,15 @@ def test_strip_on_elastic_edges_has_the_frequency_of_a_beam_on_springs(
 
 
 def test_elastic_edges_lie_between_simple_and_clamped_ones() -> None:
-    simple, clamped = (frequencies_of(replace(CONCRETE, support=s)) for s in ("simple", "clamped"))
+    simple, clamped = (
+        frequencies_of(replace(CONCRETE, support=s), 200.0) for s in ("simple", "clamped")
+    )
     stiff, thin, some = (
         frequencies_of(
             replace(
                 CONCRETE, support="elastic", support_stiffness=(along,), support_rotation=(turn,)
-            )
+            ),
+            200.0,
         )
         for along, turn in ((8e11, 8e11), (2e9, 5e4), (2e9, 3e7))
     )
@@ -84,3 +76,14 @@ def test_elastic_edges_lie_between_simple_and_clamped_ones() -> None:
     assert thin[:6] == pytest.approx(simple[:6], rel=2e-2)
     assert (simple[:4] < some[:4]).all()
     assert (some[:4] < clamped[:4]).all()
+
+
+@pytest.mark.parametrize("thickness", [0.003, 0.01, 0.18])
+def test_stiff_rotation_springs_clamp_light_plates(thickness: float) -> None:
+    """Springs of 1e12 N and more were lost in rounding."""
+    plate = thud.Plate(thickness=thickness, density=500.0, wave_speed=2500.0, support="clamped")
+    stiff = replace(plate, support="elastic", support_rotation=(1e14,))
+    frequency = np.array([2.0, 20.0, 200.0])
+    assert thud.mobility(stiff, frequency).values == pytest.approx(
+        thud.mobility(plate, frequency).values, rel=1e-4
+    )

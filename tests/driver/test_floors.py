@@ -6,7 +6,7 @@ import csv
 import re
 import warnings
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -186,47 +186,6 @@ def test_points_of_a_plate_move(run: Run, case_file: CaseFile) -> None:
     assert under == pytest.approx(found.floor_velocity, abs=0.02 * scale)
     assert far == pytest.approx(found.velocity_at(1.0, 0.5), abs=1e-12)
     assert 0 < abs(far).max() < scale
-    with pytest.raises(thud.InputError, match=naming("&plate", "5.0 m")):
-        thud.solve(floor=thud.Plate(point_x=[9.0], point_y=[1.0]))
-
-
-@pytest.mark.parametrize(
-    ("floor", "frequency", "point", "words"),
-    [
-        *((thud.Plate(), 31.5, point, naming("point"))
-          for point in (0, (1.0,), (1, 2, 3), "ab", (1j, 1), (None, 1), (np.nan, 1))),
-        *((thud.Plate(), frequency, None, naming("frequency", "finite"))
-          for frequency in (np.nan, np.inf)),
-        (LIGHT, 50.0, np.array([1.0, 1.0]), naming("no point except")),
-    ],
-)  # fmt: skip
-def test_mobility_at_no_point_or_frequency_is_refused(
-    moved: thud.FloorImpact, floor: FloorOptions, frequency: float, point: object, words: str
-) -> None:
-    with pytest.raises(thud.InputError, match=words):
-        thud.mobility(floor, [31.5, frequency], point)  # type: ignore[arg-type]
-    with pytest.raises(thud.InputError, match=naming("no point except")):
-        moved.velocity_at(1.0, 1.0)
-
-
-@pytest.mark.parametrize(
-    ("kind", "keys", "words"),
-    [
-        (thud.InfinitePlate, {"resistance": 0.0}, naming("&infinite_plate: resistance", 0.0)),
-        (thud.Oscillator, {"stiffness": -1.0}, naming("&oscillator: stiffness", -1.0)),
-        (lambda: "plate", {}, naming("floor")),
-        *((kind, {"point_x": [1.0, 2.0], "point_y": [1.0]}, naming(f"&{name}:", "point_y", 1))
-          for name, kind in (("plate", thud.Plate), ("laminate_floor", thud.LaminateFloor),
-                             ("joist_floor", thud.JoistFloor))),
-    ],
-)  # fmt: skip
-def test_floors_that_cannot_be_are_refused(
-    kind: Callable[..., FloorOptions], keys: dict[str, Any], words: str
-) -> None:
-    with pytest.raises((thud.InputError, TypeError), match=words):
-        thud.solve(floor=kind(**keys))
-    with pytest.raises((thud.InputError, TypeError), match=words):
-        thud.mobility(kind(**keys), [50.0])
 
 
 def test_result_on_a_floor_is_shown(moved: thud.FloorImpact) -> None:
@@ -261,3 +220,8 @@ def test_levels_of_both_forces_are_those_of_the_records(moved: thud.FloorImpact)
     assert not any("e" in row[4] for row in rows)
     assert [float(row[4]) for row in rows] == pytest.approx(1e3 * energy.energy, rel=5e-3)
     assert f"{20 * np.log10(contact.max() / blocked.max()):+.2f} dB" in repr(moved)
+
+
+def test_warning_says_where_the_modes_of_a_floor_end() -> None:
+    with pytest.warns(thud.PlausibilityWarning, match="&joist_floor: above 678 Hz the modes"):
+        thud.solve(floor=thud.JoistFloor(support="clamped"))

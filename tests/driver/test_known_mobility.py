@@ -77,10 +77,3 @@ def test_plate_takes_over_outside_the_measurement(floor: thud.MeasuredMobility) 
     assert (known.conductance[outside] == plate.conductance[outside]).all()
     assert (known.conductance[~outside] != plate.conductance[~outside]).all()
     assert any("above 300 Hz" in str(note) for note in known.notes)
-
-
-def test_mobility_without_a_plate_does_not_radiate(floor: thud.MeasuredMobility) -> None:
-    with pytest.raises(thud.InputError, match=naming("measured_mobility", "thickness", "plate")):
-        thud.predict_level(floor=replace(floor, thickness=0.0), room=ROOM)
-    with pytest.raises(thud.InputError, match=naming("measured_mobility", "thickness", 0.001)):
-        thud.predict_level(floor=replace(floor, thickness=1e-4), room=ROOM)

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
-from conftest import naming
 
 import thud
 from thud.plot.floor_figures import plate_modes
@@ -79,32 +77,6 @@ def test_mean_of_positions_is_the_modal_level_of_the_prediction(shell: thud.Impa
     assert room.prediction.simple_level[:n] == pytest.approx(room.mean)
 
 
-@pytest.mark.parametrize(
-    ("settings", "words"),
-    [
-        ({"balls": np.zeros((0, 2))}, naming("balls", "(0, 2)")),
-        ({"balls": [[1.0, 9.0]]}, naming("balls", 9.0, 0, 4.5)),
-        ({"microphones": [[1.0, 1.0]]}, naming("microphones", "(1, 2)")),
-        ({"max_frequency": "high"}, naming("max_frequency")),
-        ({"floor": thud.Oscillator()}, naming("&floor: name", "plate")),
-        (
-            {"floor": thud.Plate(length=40.0, width=30.0), "room": thud.Room(height=10.0)},
-            naming("overlap", "volume"),
-        ),
-        ({"room": thud.Room(length=5.0, width=3.0)}, naming("length", 5.0, 4.5)),
-        ({"room": thud.Room(corner_y=2.0, width=2.0)}, naming("corner_y", 4.0, 3.7)),
-    ],
-)
-def test_what_has_no_modal_answer_is_refused(
-    shell: thud.Impact, settings: dict[str, object], words: str
-) -> None:
-    with pytest.raises(thud.InputError, match=words):
-        thud.modal_room(
-            thud.predict_level(shell, settings.pop("floor", FLOOR), settings.pop("room", ROOM)),  # type: ignore[arg-type]
-            **settings,  # type: ignore[arg-type]
-        )
-
-
 def test_numbers_of_all_positions_are_shown(room: thud.ModalRoom) -> None:
     assert [row[0] for row in room.rows()[1:]] == [f"{f:g}" for f in room.frequency]
     for column, values in ((1, room.mean), (3, room.level.min(axis=(0, 1)))):
@@ -156,24 +128,6 @@ def test_positions_on_a_wall_below_are_no_samples(shell: thud.Impact) -> None:
     assert thud.modal_room(found).mean == pytest.approx(
         10 * np.log10(kept.mean(axis=(0, 1))), abs=1e-6
     )
-
-
-@pytest.mark.parametrize(
-    ("floor", "words"),
-    [
-        ({"line_x": (2.5,)}, ("source", 2.5, "line_x")),
-        ({"line_y": (2.04,)}, ("source", "line_y")),
-        (
-            {"support": "elastic", "support_stiffness": (0.0,), "support_rotation": (1e6,)},
-            ("support = elastic", "line_x or line_y"),
-        ),
-    ],
-)
-def test_floors_that_cannot_carry_the_ball_are_refused(
-    floor: dict[str, Any], words: tuple[str | float, ...]
-) -> None:
-    with pytest.raises(thud.InputError, match=naming("&plate", *words)):
-        thud.solve(floor=thud.Plate(**floor))
 
 
 def test_improvement_by_a_covering_is_left_out() -> None:

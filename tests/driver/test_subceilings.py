@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from conftest import frequencies_of
 
 import thud
 from thud.base.bridge import ask
@@ -20,31 +21,28 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-# 160 mm of concrete, and 9 kg/m2 of gypsum board.
-CONCRETE = thud.Plate(thickness=0.16, loss_factor=0.03, edges="absorption")
+# 160 mm of concrete, and 9 kg/m2 of gypsum board; small floors have few modes.
+CONCRETE = thud.Plate(length=2.0, width=1.6, thickness=0.16, loss_factor=0.03, edges="absorption")
 MASS, BOARD = 2300 * 0.16, 720 * 0.0125
 HUNG = replace(CONCRETE, subceiling_thickness=0.0125, cavity_depth=0.2)
-SMALL = replace(HUNG, length=3.0, width=2.5)
-JOISTS = thud.JoistFloor(length=3.0, width=2.5, subceiling_thickness=0.0125, cavity_depth=0.25)
+JOISTS = thud.JoistFloor(length=2.0, width=1.6, subceiling_thickness=0.0125, cavity_depth=0.25)
 # Stiffness of 1 m of air, N/m3.
 AIR = 1.2 * 343**2
 # Relative positions of forces.
 STRIKES = {"x": np.array([0.23, 0.41, 0.65]), "y": np.array([0.37, 0.29, 0.44])}
 
 
-def frequencies_of(
-    floor: thud.FloorOptions, highest: float, room: thud.Room | None = None
-) -> Array:
-    """Return natural frequencies, Hz."""
-    case = thud.Case(floor=floor, room=room)
-    return np.asarray(ask("floor_modes", case=case_text(case), highest=highest)["frequency"])
-
-
+@cache
 def radiated_by(floor: thud.FloorOptions) -> Array:
     """Return the energies radiated per force in one-third octaves from 50 to 630 Hz, dB."""
     case = thud.Case(floor=floor, room=thud.Room())
     answer = ask("radiation", case=case_text(case), **STRIKES)
     return np.asarray(10 * np.log10(answer["radiated"]))
+
+
+def large(floor: thud.Plate) -> thud.Plate:
+    """Return a floor of 20 m2."""
+    return replace(floor, length=5.0, width=4.0)
 
 
 def test_stiff_fastening_of_a_light_ceiling_adds_mass(oracle: Callable[..., None]) -> None:
@@ -54,7 +52,7 @@ def test_stiff_fastening_of_a_light_ceiling_adds_mass(oracle: Callable[..., None
         density=(MASS + BOARD) / 0.16,
         wave_speed=CONCRETE.wave_speed * np.sqrt(MASS / (MASS + BOARD)),
     )
-    ratio = frequencies_of(fixed, 300.0) / frequencies_of(heavier, 300.0)
+    ratio = frequencies_of(large(fixed), 300.0) / frequencies_of(large(heavier), 300.0)
     # The mass changes frequencies by 1.2 %, the stiffness of the board by 2e-5.
     oracle("natural frequencies: fixed subceiling − added mass", "other model", ratio - 1, 1e-4)
     oracle(
@@ -94,7 +92,7 @@ def test_frequencies_are_those_of_masses_on_a_spring_for_each_shape(
     matrix[:, 1, 1] = (board_stiffness * k4 + air) / BOARD
     matrix[:, 0, 1] = matrix[:, 1, 0] = -air / np.sqrt(upper * BOARD)
     expected = np.sort(np.sqrt(np.linalg.eigvalsh(matrix)).ravel()) / (2 * np.pi)
-    found = frequencies_of(light, 150.0)
+    found = frequencies_of(large(light), 150.0)
     # The second mode of the first shape lies at the resonance of both masses on the air.
     resonance = np.sqrt(air * (1 / upper + 1 / BOARD)) / (2 * np.pi)
     assert abs(found / resonance - 1).min() < 2e-3
@@ -139,31 +137,21 @@ def test_floors_with_subceilings_are_passive(floor: thud.FloorOptions) -> None:
     assert mobility.real.max() > 0
 
 
-@pytest.mark.parametrize("floor", [SMALL, JOISTS])
+KEYS = {
+    "subceiling_thickness": 0.025, "subceiling_density": 900.0, "subceiling_modulus": 8e9,
+    "subceiling_loss_factor": 0.2, "channel_stiffness": 1e6, "channel_loss_factor": 0.9,
+    "cavity_depth": 0.4, "cavity_loss_factor": 0.05, "channel_spacing": 0.25,
+}  # fmt: skip
+
+
 @pytest.mark.parametrize(
-    ("key", "value"),
-    [
-        ("subceiling_thickness", 0.025),
-        ("subceiling_density", 900.0),
-        ("subceiling_modulus", 8e9),
-        ("subceiling_loss_factor", 0.2),
-        ("channel_stiffness", 1e6),
-        ("channel_loss_factor", 0.9),
-        ("cavity_depth", 0.4),
-        ("cavity_loss_factor", 0.05),
-        ("channel_spacing", 0.25),
-    ],
+    ("floor", "key"),
+    [(floor, key) for floor in (HUNG, JOISTS) for key in KEYS if hasattr(floor, key)],
 )
-def test_each_key_changes_the_radiated_level(
-    floor: thud.Plate | thud.JoistFloor, key: str, value: float
-) -> None:
-    if not hasattr(floor, key):
-        with pytest.raises(TypeError, match=key):
-            replace(floor, **{key: value})
-        return
-    without = replace(floor, subceiling_thickness=0.0)
-    change: dict[str, Any] = {key: value}
+def test_each_key_changes_the_radiated_level(floor: thud.FloorOptions, key: str) -> None:
+    change: dict[str, Any] = {key: KEYS[key]}
     assert abs(radiated_by(replace(floor, **change)) - radiated_by(floor)).max() > 0.05
+    without = replace(floor, subceiling_thickness=0.0)
     if key != "subceiling_thickness":
         assert radiated_by(replace(without, **change)) == pytest.approx(radiated_by(without))
 
@@ -175,19 +163,6 @@ def test_subceiling_lies_below_a_floating_plate() -> None:
     # As below the slab alone: the layers are far apart in frequency and mass.
     assert change[2:8] == pytest.approx((radiated_by(HUNG) - radiated_by(CONCRETE))[2:8], abs=3.0)
     assert change[7] < -20
-
-
-@pytest.mark.parametrize(
-    ("room", "words"),
-    [
-        ({"ceiling_mass": 9.0}, "ceiling_mass and subceiling_thickness of the floor describe"),
-        ({"radiation": "iso_12354"}, "radiation = iso_12354"),
-    ],
-)
-def test_rooms_that_contradict_a_subceiling_are_refused(room: dict[str, Any], words: str) -> None:
-    with pytest.raises(thud.InputError, match=words) as refused:
-        thud.solve(model="hollow_sphere", floor=HUNG, room=thud.Room(**room))
-    assert "\n" not in str(refused.value)
 
 
 def test_air_of_the_room_is_the_spring_of_a_subceiling() -> None:
@@ -203,23 +178,21 @@ def test_air_of_the_room_is_the_spring_of_a_subceiling() -> None:
     found = frequencies_of(floor, 150.0, dense)
     assert abs(found / resonance - 1).min() < 0.01
     assert abs(frequencies_of(floor, 150.0, light) / resonance - 1).min() > 0.01
-    fast = replace(dense, sound_speed=400.0)
-    deep = thud.solve(model="hollow_sphere", floor=replace(HUNG, cavity_depth=0.5), room=fast)
-    assert any("above 200 Hz the cavity" in str(note) for note in deep.notes)
 
 
 def test_air_of_the_room_damps_the_floor_and_changes_the_force() -> None:
     thin = thud.Plate(
-        thickness=0.012, density=500.0, wave_speed=2500.0, loss_factor=0.001, edges="absorption",
-        subceiling_thickness=0.0125, cavity_depth=0.02,
+        length=1.0, width=0.8, thickness=0.012, density=500.0, wave_speed=2500.0, loss_factor=0.001,
+        edges="absorption", subceiling_thickness=0.0125, cavity_depth=0.02,
     )  # fmt: skip
-    dense, light = thud.Room(air_density=2.0), thud.Room(air_density=0.5)
+    dense, light = (thud.Room(air_density=x, reverberation_time=0.05) for x in (2.0, 0.5))
     losses = [
         ask("floor_modes", case=case_text(thud.Case(floor=thin, room=room)), highest=200.0)
         for room in (dense, light)
     ]
     assert losses[0]["loss_factor"][0] > losses[1]["loss_factor"][0]
     impact = thud.solve(floor=thin, room=light)
+    # Also of a drop that was computed in another air.
     moved = thud.predict_level(impact, thin, dense).source
     expected = thud.solve(floor=thin, room=dense).on_floor
     assert expected is not None
@@ -228,16 +201,21 @@ def test_air_of_the_room_damps_the_floor_and_changes_the_force() -> None:
     assert moved.peak("floor") != pytest.approx(impact.on_floor.peak("floor"), rel=1e-4)
 
 
-def test_limits_of_cavity_and_board_are_warned_of() -> None:
-    deep = thud.solve(model="hollow_sphere", floor=replace(HUNG, cavity_depth=0.5))
-    assert any("above 172 Hz the cavity" in str(note) for note in deep.notes)
-    thick = replace(HUNG, cavity_depth=0.02, subceiling_thickness=0.2, subceiling_modulus=1e8)
-    notes = thud.solve(model="hollow_sphere", floor=thick).notes
-    assert any("six thicknesses of the subceiling" in str(note) for note in notes)
-    assert not any("subceiling" in str(note) for note in thud.solve(floor=CONCRETE).notes)
-
-
-def test_foils_are_no_subceilings() -> None:
-    floor = thud.Plate(subceiling_thickness=1e-4)
-    with pytest.raises(thud.InputError, match=re.escape("allowed: 0, or 0.0005 to 0.2 m")):
-        thud.solve(floor=floor)
+@pytest.mark.parametrize(
+    ("change", "speed", "words"),
+    [
+        ({"cavity_depth": 0.5}, 343.0, "172 Hz the cavity"),
+        ({"cavity_depth": 0.5}, 400.0, "200 Hz the cavity"),
+        ({"cavity_depth": 0.02, "subceiling_thickness": 0.2, "subceiling_modulus": 1e8}, 343.0,
+         "six thicknesses of the subceiling"),
+        ({"cavity_depth": 0.02}, 343.0, None),
+    ],
+)  # fmt: skip
+def test_limits_of_cavity_and_board_are_warned_of(
+    change: dict[str, Any], speed: float, words: str | None
+) -> None:
+    room = thud.Room(sound_speed=speed, reverberation_time=0.05)
+    notes = thud.solve(model="hollow_sphere", floor=replace(HUNG, **change), room=room).notes
+    texts = [str(note) for note in notes if note.code == "outside_frequencies"]
+    assert len(texts) == (words is not None)
+    assert all(words is not None and words in text for text in texts)
