@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import pytest
-from conftest import naming
+from conftest import codes, naming, noted
 
 import thud
 from thud.cli import main
 from thud.floors import mobility_fit
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
     from pathlib import Path
 
 FREQUENCY = np.linspace(10, 1000, 300)
@@ -83,13 +83,6 @@ def test_mobilities_that_no_floor_has_raise_a_warning(name: str, factor: float) 
     found = [note for note in notes if note.code == "mobility_implausible"]
     assert len(found) == (factor != 1)
     assert all(not note.low <= note.value <= note.high for note in found)
-
-
-def test_impedance_is_named_where_its_fit_is_refused() -> None:
-    frequency = np.linspace(20.0, 700.0, 200)
-    values = 1 / thud.mobility(thud.construction("concrete 180").floor, frequency).values
-    with pytest.raises(thud.InputError, match=naming("measurement: ", "0.001 m/(N s)")):
-        thud.fit_mobility(thud.Mobility(frequency, values))
 
 
 def test_noise_is_not_fitted() -> None:
@@ -163,62 +156,29 @@ def test_units_of_universal_files_are_applied_or_refused(
             system and units,
             **labels,
         )
-        if length is None or force is None or not agree:
-            with pytest.raises(thud.InputError, match=r"point\.uff: .*unit"):
-                thud.read_mobility(path)
-        else:
-            np.testing.assert_allclose(thud.read_mobility(path).values, MOBILITY, rtol=1e-4)
+        refused = pytest.raises(thud.InputError, match=naming(path, "unit"))
+        with refused if length is None or force is None or not agree else nullcontext():
+            assert thud.read_mobility(path).values == pytest.approx(MOBILITY, rel=1e-4)
 
 
 @pytest.mark.parametrize(
-    ("sign", "header", "words"),
+    ("sign", "header", "facts"),
     [
         # Opposite directions, none that is stated, and the reaction of the force.
-        (-1, {"rsp_dir": 3}, ""),
-        (1, {"rsp_dir": 0}, ""),
-        (1, {"orddenom_spec_data_type": 9}, ""),
-        (1, {"func_type": 1}, naming("point.uff", 0)),
-        (1, {"orddenom_spec_data_type": 12}, naming("point.uff", "type 11", "type 12")),
-        (1, {"abscissa_axis_units_lab": "rad/s"}, naming("point.uff", "frequencies", "rad/s")),
+        (-1, {"rsp_dir": 3}, ()),
+        (1, {"rsp_dir": 0}, ()),
+        (1, {"orddenom_spec_data_type": 9}, ()),
+        (1, {"func_type": 1}, (0,)),
+        (1, {"orddenom_spec_data_type": 12}, ("type 11", "type 12")),
+        (1, {"abscissa_axis_units_lab": "rad/s"}, ("frequencies", "rad/s")),
     ],
 )
 def test_header_of_a_universal_file_decides_sign_and_refusal(
-    tmp_path: Path, sign: int, header: dict[str, Any], words: str
+    tmp_path: Path, sign: int, header: dict[str, Any], facts: tuple[object, ...]
 ) -> None:
     path = write_universal(tmp_path / "point.uff", 11, sign * MOBILITY, **header)
-    if words:
-        with pytest.raises(thud.InputError, match=words):
-            thud.read_mobility(path)
-    else:
-        np.testing.assert_allclose(thud.read_mobility(path).values, MOBILITY, rtol=1e-4)
-
-
-@pytest.mark.parametrize(
-    ("columns", "options", "words"),
-    [
-        ((FREQUENCY, -MOBILITY), {"order": 4}, naming("mobility", "real")),
-        ((FREQUENCY[::-1], MOBILITY), {"order": 4}, naming("point 2", "Hz")),
-        ((FREQUENCY, np.where(S.imag > 900, 0, MOBILITY)), {}, naming("Hz", 0)),
-        ((FREQUENCY[:1], MOBILITY[:1]), {}, naming(1, "octave", "31.5")),
-        ((FREQUENCY, MOBILITY[:5]), {}, naming(300, 5)),
-        ((-FREQUENCY[::-1], MOBILITY), {}, naming(300, "octave", "500 Hz")),
-        ((1e5 * FREQUENCY, MOBILITY), {}, naming(300, "octave", "500 Hz")),
-        # Two frequencies 0.08 Hz apart gave a floor with an error of 0.085 %.
-        (([10.0, 10.08], [1e-5 + 1e-6j] * 2), {}, naming(2, "octave", "31.5")),
-        (([30.0, 60.0], [1e-5] * 2), {}, naming(2, "octave", "31.5")),
-        (([40.0, 50.0, 60.0], [1e-5] * 3), {}, naming(3, "octave", "31.5")),
-        (([], []), {}, naming("frequency", "empty")),
-        ((["a"], ["b"]), {}, naming("frequency", "real")),
-        (([10, 20, 30], [1, np.nan, 1]), {}, naming("values", "20 Hz", "finite")),
-        *(
-            ((FREQUENCY, MOBILITY), {"order": order}, naming("order", repr(order), 1, 64))
-            for order in (0, 2.5, "a", True, 65, 300)
-        ),
-    ],
-)
-def test_bad_input_is_named(columns: Any, options: dict[str, Any], words: str) -> None:  # noqa: ANN401
-    with pytest.raises(thud.InputError, match=words):
-        thud.fit_mobility(thud.Mobility(*columns), **options)
+    with pytest.raises(thud.InputError, match=naming(path, *facts)) if facts else nullcontext():
+        assert thud.read_mobility(path).values == pytest.approx(MOBILITY, rel=1e-4)
 
 
 def test_values_that_overflow_end_in_one_sentence(capfd: pytest.CaptureFixture[str]) -> None:
@@ -255,10 +215,10 @@ def test_orders_that_fail_are_passed_over(monkeypatch: pytest.MonkeyPatch) -> No
         thud.fit_mobility(thud.Mobility(FREQUENCY, MOBILITY))
 
 
-def test_negative_lines_raise_a_warning_and_left_out() -> None:
+def test_negative_lines_raise_a_warning_and_are_left_out() -> None:
     values = MOBILITY - 2 * MOBILITY.real * (np.arange(300) % 10 == 0)
     found = thud.fit_mobility(thud.Mobility(FREQUENCY, values), order=8)
-    assert (found.notes[0].code, found.notes[0].value) == ("real_part_negative", 10.0)
+    assert noted(found.notes, "real_part_negative").value == 10
     assert thud.mobility(found.floor, np.geomspace(0.1, 1e6, 5000)).values.real.min() >= 0
 
 
@@ -310,29 +270,6 @@ def test_ball_feels_a_noisy_measured_floor_as_the_floor() -> None:
     # by the modes of the sheathing, of which there are more than poles.
     np.testing.assert_allclose(found.difference(), expected.difference(), atol=0.03)
     assert abs(expected.difference()).max() > 0.5
-
-
-@pytest.mark.parametrize(
-    ("titles", "words"),
-    [
-        ("frequency_rpm,real (mph),imaginary", naming("column 2, 'real'", "mph")),
-        ("frequency,real (m/(N s)),imaginary [g/N]", naming("mobility", "accelerance")),
-        ("frequency,real (mm/N),imaginary (N/m)", naming("column 3, 'imaginary'", "N/m")),
-        ("frequency (ms),magnitude,phase", naming("column 1, 'frequency'", "ms")),
-        ("frequency,magnitude (dB),phase", naming("column 2, 'magnitude'", "dB")),
-        ("frequency,,imaginary", naming("'frequency, , imaginary'")),
-        ("frequency,real,real", naming("real")),
-        ("frequency,real", naming(2, "3 columns")),
-        ("frequency,real,", naming("'frequency, real'", "imaginary")),
-        ("frequency,real accelerance,imaginary", naming("'mobility'", "'accelerance'")),
-    ],
-)
-def test_titles_that_do_not_fit_are_refused(tmp_path: Path, titles: str, words: str) -> None:
-    columns = (FREQUENCY, MOBILITY.real, MOBILITY.imag)[: 3 - titles.endswith(",")]
-    path = write_table(tmp_path / "point.csv", titles.removesuffix(","), *columns)
-    with pytest.raises(thud.InputError, match=words) as caught:
-        thud.read_mobility(path, "mobility" if "accelerance," in titles else None)
-    assert "point.csv" in str(caught.value)
 
 
 @pytest.mark.parametrize(
@@ -388,37 +325,37 @@ def test_octaves_that_are_not_covered_have_no_error(exact: thud.MobilityFit) -> 
 
 
 @pytest.mark.parametrize(
-    ("factor", "free_error", "count"),
+    ("factor", "free_error", "code"),
     [
         # More than 10 % off; worse than 1.5 times the free fit; neither; exact.
-        (1 / 1.101, 0.09, 1),
-        (1 / 1.099, 0.09, 0),
-        (1 / 1.05, 0.033, 1),
-        (1 / 1.05, 0.034, 0),
-        (1.0 + 1e-9, 0.0, 0),
-        (1.0 + 2e-8, 0.0, 1),
+        (1 / 1.101, 0.09, "mobility_misfit"),
+        (1 / 1.099, 0.09, ""),
+        (1 / 1.05, 0.033, "passivity_misfit"),
+        (1 / 1.05, 0.034, ""),
+        (1.0 + 1e-9, 0.0, ""),
+        (1.0 + 2e-8, 0.0, "passivity_misfit"),
     ],
 )
 def test_fits_that_miss_raise_a_warning(
-    exact: thud.MobilityFit, factor: float, free_error: float, count: int
+    exact: thud.MobilityFit, factor: float, free_error: float, code: str
 ) -> None:
     found = replace(scaled_fit(exact, np.full(300, factor)), free_error=free_error)
-    assert len(found.notes) == count
+    assert codes(found.notes) == [code] * bool(code)
 
 
 def choose(
-    monkeypatch: pytest.MonkeyPatch, count: int, error: Callable[[int], float]
+    monkeypatch: pytest.MonkeyPatch, count: int, errors: dict[int, float]
 ) -> tuple[int, list[int]]:
-    """Return the number of poles of a fit to lines, and those that were tried."""
+    """Return the number of poles of a fit to lines with some errors, and those that were tried."""
     tried = []
 
-    def fit(*arguments: Any) -> Any:  # noqa: ANN401
-        tried.append(arguments[1])
-        return SimpleNamespace(order=arguments[1], error=error(arguments[1]))
+    def fit(_: thud.Mobility, order: int) -> SimpleNamespace:
+        tried.append(order)
+        return SimpleNamespace(order=order, error=errors.get(order, errors[0]))
 
     monkeypatch.setattr(mobility_fit, "_fit", fit)
-    found: Any = mobility_fit._best_fit(thud.Mobility(np.arange(1.0, count + 1), np.ones(count)))  # noqa: SLF001
-    return found.order, tried
+    found = mobility_fit._best_fit(thud.Mobility(np.arange(1.0, count + 1), np.ones(count)))  # noqa: SLF001
+    return found.order, tried  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize("n_line", [20, 25, 40, 100, 400])
@@ -426,11 +363,12 @@ def test_number_of_poles_has_the_least_information_criterion(
     n_line: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """That of n = 2 lines and k = 2 poles + 1 coefficients is n lg error**2 + k lg n."""
-    errors = {2: 0.5, 4: 0.2, 6: 0.1, 8: 0.0995, 10: 0.099, 12: 0.08}
-    found, tried = choose(monkeypatch, n_line, lambda order: errors.get(order, 0.0799))
+    errors = {0: 0.0799, 2: 0.5, 4: 0.2, 6: 0.1, 8: 0.0995, 10: 0.099, 12: 0.08}
+    found, tried = choose(monkeypatch, n_line, errors)
     count = 2 * n_line
     criteria = {
-        k: count * np.log(errors.get(k, 0.0799) ** 2) + (2 * k + 1) * np.log(count) for k in tried
+        k: count * np.log(errors.get(k, errors[0]) ** 2) + (2 * k + 1) * np.log(count)
+        for k in tried
     }
     assert found == min(criteria, key=criteria.__getitem__)
     # Three values for each coefficient; and five numbers in a row without a gain end it.
@@ -438,20 +376,14 @@ def test_number_of_poles_has_the_least_information_criterion(
               if 3 * (2 * k + 1) <= count]  # fmt: skip
     assert tried == orders[: len(tried)]
     assert len(tried) - 1 - tried.index(found) == 5 or tried == orders
-
-
-def test_exact_fit_ends_the_choice(monkeypatch: pytest.MonkeyPatch) -> None:
-    error = {4: 1e-8}
-    assert choose(monkeypatch, 400, lambda order: error.get(order, 1.1e-8)) == (4, [2, 4])
-    # Few lines have few poles, and one at least.
-    assert choose(monkeypatch, 2, lambda _: 1.0) == (1, [1])
+    # An exact fit ends it; few lines have few poles, and one at least.
+    assert choose(monkeypatch, 400, {0: 1.1e-8, 4: 1e-8}) == (4, [2, 4])
+    assert choose(monkeypatch, 2, {0: 1.0}) == (1, [1])
 
 
 def test_line_at_0_hz_is_left_out_and_few_are_enough(tmp_path: Path) -> None:
     path = write_table(tmp_path / "point.csv", "f,re,im", np.arange(3.0), *2 * [np.ones(3) * 1e-5])
     assert thud.read_mobility(path).frequency.tolist() == [1, 2]
-    with pytest.raises(thud.InputError, match=naming("point.csv", 2, "octave")):
-        thud.fit_mobility(thud.read_mobility(path))
     few = thud.Mobility([20.0, 25.0, 40.0, 50.0], [1e-4] * 4)
     assert thud.fit_mobility(few).floor.damping_ratio
     assert " 1 pole," in repr(thud.fit_mobility(few, order=1))
@@ -464,10 +396,6 @@ def test_mobility_is_evaluated_saved_and_drawn(tmp_path: Path) -> None:
     between = (FREQUENCY[5] + FREQUENCY[6]) / 2
     assert of_floor(between) == pytest.approx(thud.mobility(floor, between).values)
     assert measured(between) == pytest.approx([of_floor.values[5:7].mean()])
-    with pytest.raises(thud.InputError, match=naming("frequency", 1001.0, "10 to 1000 Hz")):
-        measured([500.0, 1001.0])
-    (note,) = thud.Mobility([1.0, 2.0], [-1e-5, 1e-5]).notes
-    assert (note.code, note.value) == ("real_part_negative", 50.0)
     of_floor.save(tmp_path / "floor.csv")
     again = thud.read_mobility(tmp_path / "floor.csv")
     np.testing.assert_allclose(again.values, of_floor.values, rtol=1e-9)
