@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 # What is only imported for the table.
 __all__ = ["inf", "nan", "np", "peak_count"]
 
+LARGE = {"length": 100.0, "width": 100.0}
 FREQUENCY = np.linspace(10, 1000, 300)
 POINT = thud.mobility(thud.Oscillator(), FREQUENCY).values
 OCTAVES = (63, 125, 250, 500)
