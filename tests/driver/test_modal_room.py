@@ -77,14 +77,11 @@ def test_mean_of_positions_is_the_modal_level_of_the_prediction(shell: thud.Impa
     assert room.prediction.simple_level[:n] == pytest.approx(room.mean)
 
 
-def test_numbers_of_all_positions_are_shown(room: thud.ModalRoom) -> None:
+def test_numbers_of_all_positions_and_shapes_are_shown(room: thud.ModalRoom) -> None:
     assert [row[0] for row in room.rows()[1:]] == [f"{f:g}" for f in room.frequency]
     for column, values in ((1, room.mean), (3, room.level.min(axis=(0, 1)))):
         assert [row[column] for row in room.rows()[1:]] == [f"{value:.1f}" for value in values]
     assert f"to {room.crossover:.0f} Hz: 1 x 1 positions" in repr(room)
-
-
-def test_figures_show_positions_and_shapes(room: thud.ModalRoom) -> None:
     labels = [text.get_text() for text in room.plot().legends[0].get_texts()]
     assert "mean of positions" in labels
     titles = [axes.get_title() for axes in plate_modes(FLOOR, 4, columns=2).axes]
@@ -128,15 +125,6 @@ def test_positions_on_a_wall_below_are_no_samples(shell: thud.Impact) -> None:
     assert thud.modal_room(found).mean == pytest.approx(
         10 * np.log10(kept.mean(axis=(0, 1))), abs=1e-6
     )
-
-
-def test_improvement_by_a_covering_is_left_out() -> None:
-    room = thud.Room(volume=50.0)
-    plain = thud.Plate(thickness=0.18)
-    covered = replace(plain, covering_improvement=(10.0, 15.0, 20.0, 25.0))
-    bare = thud.modal_room(thud.predict_level(thud.solve(floor=plain, room=room)))
-    found = thud.modal_room(thud.predict_level(thud.solve(floor=covered, room=room)))
-    assert found.mean == pytest.approx(bare.mean)
 
 
 def test_one_mode_of_a_floor_drives_the_room() -> None:

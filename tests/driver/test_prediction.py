@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
+from unittest.mock import Mock
 
 import f90nml
 import numpy as np
 import pytest
-from conftest import REPOSITORY, codes, naming, recorded
+from conftest import MINIMAL, REPOSITORY, codes, naming, recorded
 
 import thud
 from thud import plot
@@ -29,50 +29,61 @@ if TYPE_CHECKING:
     from conftest import CaseFile, Run
     from numpy.typing import NDArray
 
-FLOORS = REPOSITORY / "inputs" / "floors"
-PLATE = "&plate\n thickness = 0.2\n/\n"
-FLOOR_CASE = f"&ball /\n&drop /\n&model name = 'hollow_sphere' /\n&floor name = 'plate' /\n{PLATE}"
-ROOM_CASE = f"{FLOOR_CASE}&room\n volume = 40\n/\n"
+ROOM_CASE = f"""{MINIMAL}&floor name = 'plate' /
+&plate thickness = 0.2 /
+&room
+ volume = 40
+/
+"""
 # Exact mid frequencies of the one-third-octave bands from 50 to 630 Hz, Hz.
 BAND_CENTERS = 1000 * 10 ** (np.arange(-13, -1) / 10)
-RIGID_CASE = ROOM_CASE.replace("'plate'", "'rigid'")
 
 
 def test_executable_and_python_predict_the_same(run: Run, case_file: CaseFile) -> None:
-    done = run(case_file(ROOM_CASE), "-o", "out")
+    keys = "volume = 40\n wall_lengths = 5, 4, 4\n ceiling_mass = 12\n positions = 'even'"
+    done = run(case_file(ROOM_CASE.replace("volume = 40", keys)), "-o", "out")
     assert done.returncode == 0, done.stderr
+    assert "contact force" in done.stdout
+    assert "rigid floor" not in done.stdout
     folder = case_file(ROOM_CASE).parent / "out"
-    with (folder / "room_levels.csv").open(encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
     impact = thud.read_results(folder)
     found = thud.predict_level(impact)
-    assert (found.floor.thickness, found.room.volume) == (0.2, 40)
-    assert [float(row["level_dB"]) for row in rows] == pytest.approx(found.level, abs=1e-9)
-    assert [float(row["nominal_Hz"]) for row in rows] == found.frequency.tolist()
+    assert isinstance(found.floor, thud.Plate)
+    assert (found.floor.thickness, found.room.wall_lengths) == (0.2, (5, 4, 4))
+    levels, octaves = (
+        np.genfromtxt(folder / f"room_{name}.csv", delimiter=",", names=True)
+        for name in ("levels", "octaves")
+    )
+    assert levels["level_dB"] == pytest.approx(found.level, abs=1e-9)
+    assert levels["nominal_Hz"].tolist() == found.frequency.tolist()
+    assert octaves["nominal_Hz"].tolist() == [63, 125, 250, 500]
+    assert octaves["level_dB"] == pytest.approx(found.octave_level, abs=1e-9)
+    sums = 10 * np.log10((10 ** (levels["level_dB"].reshape(4, 3) / 10)).sum(axis=1))
+    assert (octaves["level_dB"] <= sums + 1e-9).all()
+    shares = [levels[name] for name in ("direct_share", "wall_1_share", "wall_2_share")]
+    assert pytest.approx(found.path_shares[:, :3], abs=1e-9) == np.array(shares).T
+    assert "Energy that enters the room through the floor:" in done.stdout
     summary = f90nml.read(folder / "summary.nml")["room_summary"]
     ratings = found.ratings.values()
     assert summary["level"] == pytest.approx([entry.level for entry in ratings])
     assert summary["uncertainty"] == pytest.approx(found.rating.uncertainty)
     assert str(found.rating) in " ".join(done.stdout.split())
     assert f"&room: {found.source_notes[0]}" in done.stderr
+    bare = thud.predict_level(impact, room=thud.Room(volume=40.0))
+    assert (found.level[6:] < bare.level[6:] - 8).all()
 
 
 @pytest.mark.parametrize("thickness", [0.02, 0.2])
 def test_executable_tells_of_a_floor_that_gives_way(
     run: Run, case_file: CaseFile, thickness: float
 ) -> None:
-    text = ROOM_CASE.replace("0.2", f"{thickness}")
     modes = "frequency = 24, 89\n damping_ratio = 0.05, 0.1\n effective_mass = 2.4, 0.1"
-    model = f"&model name = 'measured_modes' /\n&measured_modes {modes} /"
-    blocked = text.replace("&model name = 'hollow_sphere' /", model)
-    done = run(case_file(blocked), "-o", "out")
+    text = ROOM_CASE.replace("0.2", f"{thickness}").replace("hollow_sphere", "measured_modes")
+    done = run(case_file(f"{text}&measured_modes {modes} /"), "-o", "out")
     assert done.returncode == 0, done.stderr
     assert ("rigid floor" in done.stdout) == (thickness < 0.1)
     assert "blocked force" in done.stdout
     assert re.search(naming("'measured_modes'", "floor"), done.stderr)
-    done = run(case_file(text), "-o", "moving")
-    assert "rigid floor" not in done.stdout
-    assert "contact force" in done.stdout
 
 
 def test_energy_is_that_of_an_infinite_plate(shell: thud.Impact) -> None:
@@ -91,30 +102,34 @@ def test_energy_is_that_of_an_infinite_plate(shell: thud.Impact) -> None:
 
 def test_standardization_takes_room_and_reverberation_out(shell: thud.Impact) -> None:
     """Of the reference room nothing is left; twice the volume halves the energy of sound."""
-    reference = thud.predict_level(shell, thud.Plate(), thud.Room())
+
+    def predict(**keys: Any) -> thud.RoomPrediction:  # noqa: ANN401 - of any key
+        return thud.predict_level(shell, thud.Plate(), thud.Room(**keys))
+
+    reference = predict()
     assert reference.standardized == pytest.approx(reference.level)
-    larger = thud.predict_level(shell, thud.Plate(), thud.Room(volume=100.0))
     # Above the modal bands.
     half = reference.level - 10 * np.log10(2)
-    assert larger.level[-4:] == pytest.approx(half[-4:], abs=0.1)
+    assert predict(volume=100.0).level[-4:] == pytest.approx(half[-4:], abs=0.1)
     times = (0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5)
-    longer = thud.predict_level(shell, thud.Plate(), thud.Room(reverberation_time=times))
+    longer = predict(reverberation_time=times)
     assert longer.reverberation_time.tolist() == list(times)
     assert (longer.level[2:] > reference.level[2:]).all()
+    octaves = predict(reverberation_time=(0.9, 0.6, 0.5, 0.4)).reverberation_time
+    assert octaves.tolist() == [0.9] * 3 + [0.6] * 3 + [0.5] * 3 + [0.4] * 3
+    room = thud.Room(reverberation_time=0.8)
+    assert room == thud.Room(reverberation_time=(0.8,)) == thud.Room(reverberation_time=[0.8])
 
 
 @pytest.mark.parametrize("thickness", [0.022, 0.005])
-def test_floor_that_gives_way_raises_a_warning(shell: thud.Impact, thickness: float) -> None:
+def test_recording_has_the_blocked_force(shell: thud.Impact, thickness: float) -> None:
     """Chipboard, 22 mm Z about 1600 N s/m, and 5 mm, on which the force does not swing."""
     board = thud.Plate(thickness=thickness, density=650.0, wave_speed=2300.0)
     record = recorded(shell, mass=2.5, height=1.0)
-    found = thud.predict_level(record, board, thud.Room())
-    assert "blocked_force" in codes(found.notes)
+    found = thud.predict_level(record, board, thud.Room(reverberation_time=0.1))
     assert found.force == "blocked"
     change = _force_change(2.5, record.contact_time, 1 / found.conductance[0])
     assert found.force_change == pytest.approx(change)
-    heavy = thud.predict_level(record, thud.Plate(thickness=0.3), thud.Room())
-    assert "blocked_force" not in codes(heavy.notes)
 
 
 def test_room_hears_the_mean_of_the_drops_without_noise(shell: thud.Impact) -> None:
@@ -139,107 +154,37 @@ def test_room_hears_the_mean_of_the_drops_without_noise(shell: thud.Impact) -> N
     )
 
 
-def test_implausibly_low_rating_raises_a_warning(shell: thud.Impact) -> None:
-    floor = thud.Plate(thickness=0.3, screed_thickness=0.08, layer_stiffness=6.0e6)
-    quiet = thud.predict_level(shell, floor, thud.Room(ceiling_mass=30.0, ceiling_depth=0.5))
-    for prediction in quiet, thud.predict_level(shell, thud.Plate(), thud.Room()):
-        warned = "level_below_paths" in codes(prediction.notes)
-        assert warned == (prediction.rating.level < 30)
-    assert quiet.rating.level < 30
+@pytest.mark.parametrize("thickness", [0.16, 0.3])
+def test_implausibly_low_rating_raises_a_warning(shell: thud.Impact, thickness: float) -> None:
+    floor = thud.Plate(thickness=thickness, screed_thickness=0.08, layer_stiffness=6.0e6)
+    found = thud.predict_level(shell, floor, thud.Room())
+    assert (found.rating.level < 30) == (thickness == 0.3)
+    assert ("level_below_paths" in codes(found.notes)) == (thickness == 0.3)
 
 
-def test_prediction_is_held_against_measured_levels(shell: thud.Impact) -> None:
-    found = thud.predict_level(shell, thud.Plate(), thud.Room())
-    measured = thud.read_room_levels(FLOORS / "field_levels.csv", volume=41.4)
-    assert found.difference(measured) == pytest.approx(measured.level - found.level)
-    octaves = thud.RoomLevels("o", "octave", np.array([63.0, 125, 250, 500]), np.full((1, 4), 60.0))
-    with pytest.raises(thud.InputError, match=naming("octave", "third")):
-        found.difference(octaves)
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("&model /\n&room /\n", naming("&room", "&floor")),
-        ("&model /\n&plate /\n", naming("&plate", "line 2", "&floor")),
-        (RIGID_CASE.replace(PLATE, ""), naming("&floor: name", "plate")),
-        (RIGID_CASE, naming("&plate", "line 5", "&floor: name", "'rigid'")),
-        *((ROOM_CASE.replace(old, new), naming(*words)) for old, new, *words in (
-            ("'plate'", "'plat'", "'plat'", "'plate'"),
-            ("thickness", "thicknes", "thicknes", "'thickness'"),
-            ("0.2", "-0.2", "&plate: thickness", -0.2),
-        )),
-        *((ROOM_CASE.replace("volume = 40", new), naming(*words)) for new, *words in (
-            ("volume = -1", "&room: volume", -1.0),
-            ("wall_lengths = 9, 9.5", "wall_lengths", "18.5 m"),
-            ("wall_lengths = 5, 4, 4\n wall_density = 900, 1800",
-             "&room: wall_density", "2 values", "3 wall_lengths"),
-            ("volume = 10, ceiling_mass = 9, ceiling_depth = 0.6", "ceiling_depth", "0.6 m"),
-            ("wall_junction = 'x'", "wall_junction", "'x'"),
-            ("reverberation_time = 1, 2", "reverberation_time", 2, 4, 12),
-        )),
-    ],
-)  # fmt: skip
-def test_files_of_floors_and_rooms_that_cannot_be_are_refused(
-    run: Run, case_file: CaseFile, text: str, words: str
+def test_figures_of_a_case_predict_its_level_once(
+    shell: thud.Impact, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    done = run(case_file(text))
-    assert done.returncode == 1
-    assert re.search(words, done.stderr), done.stderr
-
-
-def test_walls_ceiling_and_octaves_are_written(
-    run: Run, case_file: CaseFile, shell: thud.Impact
-) -> None:
-    more = "volume = 40\n wall_lengths = 5, 4\n ceiling_mass = 12\n positions = 'even'"
-    done = run(case_file(ROOM_CASE.replace("volume = 40", more)), "-o", "out")
-    assert done.returncode == 0, done.stderr
-    folder = case_file(ROOM_CASE).parent / "out"
-    octaves = np.genfromtxt(folder / "room_octaves.csv", delimiter=",", names=True)
-    levels = np.genfromtxt(folder / "room_levels.csv", delimiter=",", names=True)
-    assert octaves["nominal_Hz"].tolist() == [63, 125, 250, 500]
-    sums = 10 * np.log10((10 ** (levels["level_dB"].reshape(4, 3) / 10)).sum(axis=1))
-    assert (octaves["level_dB"] <= sums + 1e-9).all()
-    room = thud.read_case(folder / "effective.nml").room
-    assert room is not None
-    assert room.wall_lengths == (5, 4)
-    found = thud.predict_level(shell, thud.Plate(thickness=0.2), room)
-    assert octaves["level_dB"] == pytest.approx(found.octave_level, abs=1e-9)
-    bare = thud.predict_level(shell, thud.Plate(thickness=0.2), thud.Room(volume=40.0))
-    assert (found.level[6:] < bare.level[6:] - 8).all()
-
-
-def test_figures_of_a_case_predict_its_level_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    solved = thud.solve()
-    impact = replace(solved, case=replace(solved.case, floor=thud.Plate(), room=thud.Room()))
-    predicted = []
-
-    def ask(question: str, **request: Any) -> object:  # noqa: ANN401 - as of the library
-        predicted.append(question)
-        return bridge.ask(question, **request)
-
+    impact = replace(shell, case=replace(shell.case, floor=thud.Plate(), room=thud.Room()))
+    ask = Mock(wraps=bridge.ask)
     monkeypatch.setattr("thud.floors.prediction.ask", ask)
     assert {"room", "room_positions", "floor_modes"} <= set(plot.case_figures(impact))
-    assert predicted.count("room_level") == 1
+    assert [call.args[0] for call in ask.call_args_list].count("room_level") == 1
 
 
 def test_positions_are_drawn_unless_modes_are_none_or_too_many(
     shell: thud.Impact, monkeypatch: pytest.MonkeyPatch
 ) -> None:
 
-    def drawn(floor: thud.Plate, room: thud.Room) -> set[str]:
+    def drawn(floor: thud.Plate, room: thud.Room) -> dict[str, Any]:
         case = replace(shell.case, floor=floor, room=room)
-        return set(plot.case_figures(replace(shell, case=case)))
+        return plot.case_figures(replace(shell, case=case))
 
-    plate, room = thud.Plate(), thud.Room()
+    plate, room = thud.Plate(), thud.Room(reverberation_time=0.1)
     assert "room_positions" in drawn(plate, room)
     # A hall, whose modes overlap in all bands.
     assert "room_positions" not in drawn(thud.Plate(length=12, width=10), thud.Room(height=8))
-
-    def refuse(*_: object, **_more: object) -> None:
-        message = "balls have another shape"
-        raise thud.InputError(message)
-
+    refuse = Mock(side_effect=thud.InputError("balls have another shape"))
     monkeypatch.setattr("thud.floors.modal_room._positions", refuse)
     with pytest.warns(ReportWarning, match="room_positions is not drawn .balls"):
         assert "room_positions" not in drawn(plate, room)
@@ -249,7 +194,7 @@ def test_impact_on_the_floor_itself_is_of_the_contact_force() -> None:
     floor = thud.Plate(thickness=0.02, density=600, wave_speed=2500)
     impact = thud.solve(floor=floor)
     assert impact.on_floor is not None
-    room = thud.Room()
+    room = thud.Room(reverberation_time=0.1)
     wanted = thud.predict_level(impact, floor, room)
     found = thud.predict_level(impact.on_floor, floor, room)
     assert (found.force, found.notes) == ("contact", wanted.notes)
@@ -339,13 +284,11 @@ def test_force_on_a_resistance_is_that_of_a_linear_source(resistance: float) -> 
     assert _force_change(mass, contact, resistance) == pytest.approx(expected, abs=1e-6)
 
 
-def test_force_that_just_does_not_swing_has_the_limit_of_both_sides() -> None:
+@pytest.mark.parametrize("factor", [1 - 1e-9, 1.0, 1 + 1e-9])
+def test_force_that_just_does_not_swing_has_the_limit_of_both_sides(factor: float) -> None:
     # b**2 = k/M where Z = sqrt(k M)/2: the peak is 1/e.
-    stiffness = 2.5 * (np.pi / 0.02) ** 2
-    critical = np.sqrt(stiffness * 2.5) / 2
-    for factor in (1 - 1e-9, 1.0, 1 + 1e-9):
-        found = _force_change(2.5, 0.02, critical * factor)
-        assert found == pytest.approx(-20 / np.log(10), abs=1e-3)
+    critical = 2.5 * np.pi / 0.02 / 2
+    assert _force_change(2.5, 0.02, critical * factor) == pytest.approx(-20 / np.log(10), abs=1e-3)
 
 
 @pytest.mark.parametrize("kind", ["finished", "bare"])
@@ -395,27 +338,15 @@ def test_source_that_does_not_conform_is_named(shell: thud.Impact) -> None:
     assert conforming.source_notes == ()
 
 
-def test_modal_bands_that_take_too_long_are_named(
-    run: Run, case_file: CaseFile, shell: thud.Impact
-) -> None:
+def test_modal_bands_that_take_too_long_are_named(shell: thud.Impact) -> None:
     """Bands below the crossover of a very live room were statistical without a warning."""
-
-    def predict(time: float) -> thud.RoomPrediction:
-        room = thud.Room(volume=40.0, reverberation_time=(time,))
-        return thud.predict_level(shell, thud.Plate(thickness=0.2), room)
-
-    def limit(time: float) -> float:
-        return float(np.sqrt(3 * 343**3 * time / (2.2 * 4 * np.pi * 40)))
-
-    long, short = predict(20.0), predict(3.0)
-    (warning,) = [str(note) for note in long.notes if "three modes" in str(note)]
-    assert f"from {long.frequency[long.n_modal]:g} Hz on" in warning
-    assert f"overlap, {limit(20.0):.0f} Hz" in warning
-    assert not any("three modes" in str(note) for note in short.notes)
-    assert short.n_modal == np.count_nonzero(limit(3.0) >= BAND_CENTERS)
-    assert 8 < long.n_modal < np.count_nonzero(limit(20.0) >= BAND_CENTERS)
-    done = run(case_file(ROOM_CASE.replace("40", "40\n reverberation_time = 20")), "-o", "out")
-    assert warning in done.stderr
+    room = thud.Room(volume=40.0, reverberation_time=20.0)
+    found = thud.predict_level(shell, thud.Plate(thickness=0.2), room)
+    overlap = np.sqrt(3 * 343**3 * 20 / (2.2 * 4 * np.pi * 40))
+    (warning,) = [str(note) for note in found.notes if "three modes" in str(note)]
+    assert f"from {found.frequency[found.n_modal]:g} Hz on" in warning
+    assert f"overlap, {overlap:.0f} Hz" in warning
+    assert 8 < found.n_modal < np.count_nonzero(overlap >= BAND_CENTERS)
 
 
 @pytest.mark.parametrize(
@@ -437,7 +368,7 @@ def test_walls_take_their_power_from_the_losses_of_the_edges(shell: thud.Impact)
     """
 
     def level(edges: Literal["building", "absorption"], **walls: object) -> NDArray[np.float64]:
-        room = thud.Room(radiation="iso_12354", **walls)  # type: ignore[arg-type]
+        room = thud.Room(radiation="iso_12354", reverberation_time=0.2, **walls)  # type: ignore[arg-type]
         found = thud.predict_level(shell, thud.Plate(edges=edges), room)
         # Modal levels follow the loss of the modes.
         return found.level[found.n_modal :]
@@ -467,11 +398,6 @@ def test_source_of_a_room_that_names_none_conforms(run: Run, case_file: CaseFile
     done = run(case_file("&floor name = 'plate' /\n&room /\n"), "-o", "out")
     assert str(found.rating) in " ".join(done.stdout.split())
     assert "does not conform" not in done.stderr
-    with pytest.raises(thud.InputError, match=naming("&floor is missing")):
-        thud.predict_level()
-    for name in ("floor", "room"):
-        with pytest.raises(TypeError, match=naming(name, "ndarray")):
-            thud.predict_level(**{name: np.ones(2)})  # type: ignore[arg-type]
 
 
 def test_room_has_the_dimensions_that_are_stated(shell: thud.Impact) -> None:
@@ -489,26 +415,13 @@ def test_room_has_the_dimensions_that_are_stated(shell: thud.Impact) -> None:
     (area,) = [str(note) for note in small.notes if note.code == "room_area"]
     assert "12.0 m2" in area
     assert "18.0 m2" in area
-    with pytest.raises(thud.InputError, match=naming("volume", "60.0 m3", "45.0 m3")):
-        predict(height=2.5, volume=60.0)
-
-
-def test_reverberation_time_is_one_number_or_a_list() -> None:
-    room = thud.Room(reverberation_time=0.8)
-    assert room == thud.Room(reverberation_time=(0.8,)) == thud.Room(reverberation_time=[0.8])
-    octaves = thud.predict_level(
-        floor=thud.Plate(), room=thud.Room(reverberation_time=(0.9, 0.6, 0.5, 0.4))
-    )
-    assert octaves.reverberation_time.tolist() == [0.9] * 3 + [0.6] * 3 + [0.5] * 3 + [0.4] * 3
-    with pytest.raises(TypeError, match=naming("reverberation_time", [])):
-        thud.Room(reverberation_time=())
 
 
 @pytest.mark.parametrize("name", ["octaves", "thirds", "standardized"])
 def test_requirement_is_judged_by_the_rating_that_it_names(
     run: Run, case_file: CaseFile, name: Literal["octaves", "thirds"]
 ) -> None:
-    room = thud.Room(volume=50.0, reverberation_time=1.5)
+    room = thud.Room(volume=50.0, reverberation_time=0.8)
     floor = thud.Plate(thickness=0.2)
     source = thud.solve(thud.Case(floor=floor, room=room))
     found = thud.predict_level(source, floor, replace(room, rating=name))
@@ -521,29 +434,22 @@ def test_requirement_is_judged_by_the_rating_that_it_names(
         (rating.rounded + reach + 1, "conforms"), (rating.rounded, "undecided"),
         (rating.rounded - 1, "undecided"), (rating.rounded - reach - 1, "does not conform"),
     ):  # fmt: skip
-        strict = replace(room, required=limit, rating=name)
-        prediction = thud.predict_level(source, floor, strict)
+        prediction = thud.predict_level(source, floor, replace(room, required=limit, rating=name))
         assert prediction.verdict == verdict
         distance = limit + 0.5 - prediction.rating.rounded
         chance = (1 + math.erf(distance / math.sqrt(2) / prediction.rating.uncertainty)) / 2
         assert prediction.probability == pytest.approx(chance)
-        keys = f"volume = 50\n reverberation_time = 1.5\n required = {limit}"
-        text = ROOM_CASE.replace("volume = 40", f"{keys}\n rating = '{name}'")
-        text = text.replace("&model name = 'hollow_sphere' /\n", "")
-        done = run(case_file(text), "-o", f"out_{limit}")
-        assert f"meets {limit:g} dB with {100 * prediction.probability:.0f} %" in " ".join(
-            done.stdout.split()
-        )
-        summary = f90nml.read(case_file(text).parent / f"out_{limit}" / "summary.nml")
-        assert summary["room_summary"]["verdict"] == verdict
-        assert summary["room_summary"]["probability"] == pytest.approx(
-            prediction.probability, abs=1e-9
-        )
-        page = thud.compare_floors({"floor": prediction})
-        table = page.to_dataframe().loc[0]
-        assert (table["required_dB"], table["required_rating"]) == (limit, name)
-        assert table["verdict"] == verdict
-        assert table["probability_%"] == pytest.approx(100 * prediction.probability)
+    keys = f"reverberation_time = 0.8\n required = {limit}\n rating = '{name}'"
+    text = ROOM_CASE.replace("volume = 40", f"volume = 50\n {keys}")
+    done = run(case_file(text.replace("&model name = 'hollow_sphere' /\n", "")), "-o", "out")
+    assert f"meets {limit:g} dB with {100 * chance:.0f} %" in " ".join(done.stdout.split())
+    summary = f90nml.read(case_file(text).parent / "out/summary.nml")["room_summary"]
+    assert summary["verdict"] == verdict
+    assert summary["probability"] == pytest.approx(chance, abs=1e-9)
+    table = thud.compare_floors({"floor": prediction}).to_dataframe().loc[0]
+    assert (table["required_dB"], table["required_rating"]) == (limit, name)
+    assert table["verdict"] == verdict
+    assert table["probability_%"] == pytest.approx(100 * chance)
 
 
 def test_class_is_that_of_the_rating_of_octaves() -> None:
@@ -564,8 +470,6 @@ def test_floor_is_a_construction_or_its_name(function: Any) -> None:  # noqa: AN
         assert results[0].case.room == thud.Room()
     else:
         assert repr(results[0]) == repr(results[2])
-    with pytest.raises(thud.InputError, match=naming("'concrete 180'")):
-        function(floor="conrete 180")
 
 
 def test_level_that_is_not_finite_gets_a_sentence() -> None:
@@ -575,41 +479,11 @@ def test_level_that_is_not_finite_gets_a_sentence() -> None:
         new_room_level({"room": {}, "room_levels": bands})
 
 
-@pytest.mark.parametrize(
-    ("kind", "keys", "words"),
-    [
-        # An elastic support without a spring was simple; other springs had no effect.
-        (thud.Plate, {"support": "elastic"}, ("elastic", "support_stiffness", "support_rotation")),
-        (thud.Plate, {"support_stiffness": (1e8,)}, ("support_stiffness", "unknown", "elastic")),
-        (thud.Plate, {"support": "clamped", "support_rotation": (1e8,)},
-         ("support_rotation", "clamped")),
-        (thud.Plate, {"thickness": 0.0}, ("&plate: thickness", 0.0)),
-        (thud.Plate, {"covering_improvement": (1, 2, 3)}, ("covering_improvement", 3, 4, 12)),
-        (thud.Plate, {"covering_improvement": (1.0,) * 4, "covering_stiffness": 1e6},
-         ("covering_stiffness", "covering_improvement")),
-        # A soft floor is the cause of a long contact.
-        (thud.Plate, {"thickness": 0.001}, ("duration", "soft", "stiffer floor")),
-        # Floors that radiate are listed.
-        (thud.Oscillator, {}, ("'oscillator'", "'plate'", "'modal_floor'")),
-    ],
-)  # fmt: skip
-def test_floors_without_a_level_below_them_are_refused(
-    kind: Any,  # noqa: ANN401 - any floor
-    keys: dict[str, Any],
-    words: tuple[str, ...],
-) -> None:
-    with pytest.raises(thud.ThudError, match=naming(*words)):
-        thud.predict_level(floor=kind(**keys), room=thud.Room())
-
-
-def test_paths_share_the_energy_that_enters_the_room(
-    shell: thud.Impact, run: Run, case_file: CaseFile
-) -> None:
+def test_paths_share_the_energy_that_enters_the_room(shell: thud.Impact) -> None:
     floor = thud.Plate(thickness=0.2)
     bare = thud.predict_level(shell, floor, thud.Room(volume=40.0))
     assert bare.path_shares.tolist() == [[1.0]] * 12
-    room = thud.Room(volume=40.0, wall_lengths=(5, 4, 4))
-    found = thud.predict_level(shell, floor, room)
+    found = thud.predict_level(shell, floor, thud.Room(volume=40.0, wall_lengths=(5, 4, 4)))
     assert found.path_shares.shape == (12, 4)
     assert found.path_shares.sum(axis=1) == pytest.approx(1.0)
     # Equal walls have equal shares. Walls decay as slowly as the floor does: the level rises as
@@ -618,13 +492,6 @@ def test_paths_share_the_energy_that_enters_the_room(
     rise = -10 * np.log10(found.path_shares[:, 0])
     assert found.level - bare.level == pytest.approx(rise, abs=0.3)
     assert (rise > 0.1).all()
-    text = ROOM_CASE.replace("volume = 40", "volume = 40\n wall_lengths = 5, 4, 4")
-    done = run(case_file(text), "-o", "out")
-    assert "Energy that enters the room through the floor:" in done.stdout
-    path = case_file(text).parent / "out" / "room_levels.csv"
-    table = np.genfromtxt(path, delimiter=",", names=True)
-    columns = [table[name] for name in ("direct_share", "wall_1_share", "wall_2_share")]
-    assert pytest.approx(found.path_shares[:, :3], abs=1e-9) == np.array(columns).T
 
 
 def test_walls_have_one_construction_or_one_each(shell: thud.Impact) -> None:
@@ -652,13 +519,16 @@ def test_walls_have_one_construction_or_one_each(shell: thud.Impact) -> None:
 
 
 def test_covering_lowers_the_levels_by_its_improvement(shell: thud.Impact) -> None:
-    bare = thud.predict_level(shell, thud.Plate(), thud.Room())
     octaves = (1.0, 3.0, 6.0, 10.0)
-    covered = thud.predict_level(shell, thud.Plate(covering_improvement=octaves), thud.Room())
-    expected = np.repeat(octaves, 3)
+    bare, covered = (
+        thud.predict_level(shell, thud.Plate(covering_improvement=improvement), thud.Room())
+        for improvement in ((), octaves)
+    )
     for name in ("level", "simple_level", "clamped_level"):
         change = getattr(bare, name) - getattr(covered, name)
-        assert change == pytest.approx(expected, abs=1e-6)
+        assert change == pytest.approx(np.repeat(octaves, 3), abs=1e-6)
+    heard = [thud.modal_room(prediction).mean for prediction in (bare, covered)]
+    assert heard[0] == pytest.approx(heard[1])
 
 
 def test_soft_covering_is_a_spring_under_the_source() -> None:
@@ -684,7 +554,7 @@ def test_bands_beyond_the_modes_are_those_of_the_simply_supported_floor(
 
 def test_finished_room_decays_as_stated_below_a_light_floor(shell: thud.Impact) -> None:
     """What it loses to floor and ceiling is a part of its reverberation time."""
-    floor = thud.LaminateFloor(length=3.0, width=2.0, subceiling_thickness=0.0125, cavity_depth=0.2)
+    floor = thud.LaminateFloor(length=2.0, width=1.5, subceiling_thickness=0.0125, cavity_depth=0.2)
     short, long = (
         thud.predict_level(shell, floor, thud.Room(reverberation_time=(time,)))
         for time in (0.3, 1.2)
@@ -699,7 +569,7 @@ def test_level_below_joists_hardly_depends_on_the_width_of_the_floor(
 ) -> None:
     """Modes of wide floors end below the bands; their middle represents them there."""
     impact = thud.solve(model="modal_ball")
-    room = thud.Room(length=6.0, width=5.0, height=2.5)
+    room = thud.Room(length=6.0, width=5.0, height=2.5, reverberation_time=0.1)
     narrow, wide = (
         thud.predict_level(impact, thud.JoistFloor(length=6.0, width=width, **keys), room).level
         for width in (5.0, 20.0)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 # Name and keys of a floor, name and keys of a model.
 Chosen = tuple[str, dict[str, Any], str, dict[str, Any]]
 
-PAIRS = 20
+PAIRS = 12
 FREQUENCIES = [30.0, 80.0, 200.0]
 SOURCE = {"source_x": 0.31, "source_y": 0.22}
 # Near-equal floors and models: round positions and counts, digits, lengths, keys without effect.
@@ -140,12 +140,6 @@ def test_floors_that_once_were_mistaken_for_each_other() -> None:
     first, second = (abs(thud.mobility(plate, [30.0]).values[0]) for plate in plates)
     assert first == pytest.approx(1.57e-7, rel=0.01)
     assert second == pytest.approx(3.42e-7, rel=0.01)
-
-
-def test_constructions_have_dictionaries_of_their_own() -> None:
-    name = next(entry.name for entry in thud.constructions().values() if entry.room)
-    thud.construction(name).room["ceiling_mass"] = 1.0
-    assert thud.construction(name).room["ceiling_mass"] != 1.0
 
 
 def test_samples_that_differ_in_the_floor_share_no_drop_of_another_case() -> None:
