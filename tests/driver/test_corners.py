@@ -1,7 +1,4 @@
-"""Keys at the ends of their ranges: a finite result or one sentence, unless it takes long.
-
-``python tests/driver/test_corners.py PAIRS`` tries every corner and that many pairs of each owner.
-"""
+"""Keys at the ends of their ranges: a finite result or one sentence, unless it takes long."""
 
 from __future__ import annotations
 
@@ -143,13 +140,7 @@ def test_corners_end_or_are_refused() -> None:
 
 
 def main() -> None:
-    """Answer cases of standard input, or print the faults of all corners and some pairs."""
-    if len(sys.argv) > 1:
-        draw = random.Random(2)  # noqa: S311 - draws cases
-        cases = [case_of(owner, corner) for owner in OWNERS for corner in corners_of(owner)]
-        cases += [case for owner in OWNERS for case in pairs_of(owner, int(sys.argv[1]), draw)]
-        sys.stdout.writelines(f"{fault}\n" for fault in faults_of(cases))
-        return
+    """Answer cases of standard input."""
     warnings.simplefilter("ignore")
     for line in sys.stdin:
         signal.setitimer(signal.ITIMER_PROF, DEADLINE)
