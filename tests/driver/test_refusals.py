@@ -1,14 +1,15 @@
-"""Refusals of bad input: one table, `refusals.toml`."""
+"""Refusals of bad input: the tables of the folder `refusals`, one for each room of the driver."""
 
 from __future__ import annotations
 
 import shlex
 import tomllib
+from importlib import import_module
 from typing import TYPE_CHECKING, NoReturn
 
 import pytest
-import refused
 from conftest import REPOSITORY, naming
+from refusals import core
 
 import thud
 from thud import cli
@@ -16,21 +17,23 @@ from thud import cli
 if TYPE_CHECKING:
     from pathlib import Path
 
-TABLE = tomllib.loads((REPOSITORY / "tests/driver/refusals.toml").read_text("utf-8"))
+TABLES = sorted((REPOSITORY / "tests/driver/refusals").glob("*.toml"))
+NAMES = {name: getattr(thud, name) for name in thud.__all__} | vars(core)
 # Errors of groups that raise others than InputError.
 KINDS = {"numerical": thud.NumericalError, "types": TypeError}
-NAMES = {name: getattr(thud, name) for name in thud.__all__} | vars(refused)
 
 
 @pytest.mark.parametrize(
-    ("group", "row"),
+    ("table", "group", "row"),
     [
-        pytest.param(group, row, id=f"{group}-{number}")
-        for group, rows in TABLE.items()
+        pytest.param(path.stem, group, row, id=f"{path.stem}-{group}-{number}")
+        for path in TABLES
+        for group, rows in tomllib.loads(path.read_text("utf-8")).items()
         for number, row in enumerate(rows)
     ],
 )
-def test_message_names_what_is_refused(
+def test_message_names_what_is_refused(  # noqa: PLR0913, PLR0917 - of pytest
+    table: str,
     group: str,
     row: list[str],
     tmp_path: Path,
@@ -44,6 +47,7 @@ def test_message_names_what_is_refused(
 
     monkeypatch.chdir(tmp_path)
     call, *facts = row
+    names = {**NAMES, **vars(import_module(f"refusals.{table}")), "command": command}
     with pytest.raises(KINDS.get(group, thud.InputError), match=naming(*facts)) as error:
-        eval(call, {**NAMES, "command": command})  # noqa: S307 - a table of the tests
+        eval(call, names)  # noqa: S307 - a table of the tests
     assert "\n" not in str(error.value), str(error.value)
