@@ -94,6 +94,7 @@ highlight_language = "none"  # blocks without a language are what programs print
 
 html_math_renderer = "mathml"
 html_theme = "furo"
+html_search_scorer = "docs/site/static/scorer.js"
 html_favicon = "docs/site/static/favicon.svg"
 myst_html_meta = {
     "description": "thud: the force of the rubber ball, the tyre and other heavy/soft impact"
