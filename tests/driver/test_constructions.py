@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import REPOSITORY, names_in
-from refused import construction_file, write
+from refusals.core import write
+from refusals.floors import construction_file
 from test_figure_look import assert_clean
 
 import thud

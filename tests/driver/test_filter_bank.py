@@ -26,7 +26,6 @@ PASS = ([0, 1 / 8, 1 / 4, 3 / 8, 1 / 2], [0.4, 0.5, 0.7, 1.4, 5.3])
 STOP = ([1 / 2, 1, 2, 3, 4], [1.2, 16.6, 40.5, 60, 70])
 RIPPLE = 0.4
 BANDWIDTH = 0.4
-EFFECTIVE = "effective bandwidth of the filters (IEC 61260-1 class 1)"
 
 
 def breakpoints(exponents: list[float], fraction: int) -> np.ndarray:
@@ -90,7 +89,10 @@ def test_each_filter_lies_inside_the_mask_of_class_1(
         # narrows the skirts.
         width = effective_bandwidth(sections, lower, upper, rate)
         assert 0.18 < width < 0.2004
-        oracle(EFFECTIVE, "standard", width, BANDWIDTH, "dB")
+        oracle(
+            "effective bandwidth of the filters (IEC 61260-1 class 1)",
+            "standard", width, BANDWIDTH, "dB",
+        )  # fmt: skip
 
 
 @pytest.mark.parametrize("bands", BANDWIDTHS)

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from conftest import REPOSITORY, codes, names_in, naming, noted
 from hypothesis import given, settings, strategies as st
-from refused import OCTAVES, room_levels, write
+from refusals.core import write
+from refusals.floors import OCTAVES, room_levels
 
 import thud
 from thud.cli import main

@@ -290,7 +290,7 @@ def test_search_finds_names_of_both_languages(site: Path, browser: Browser) -> N
     ("question", "page"),
     [
         ("recording", "docs/recordings"),
-        ("level", "docs/levels"),
+        ("level in the room", "docs/rooms"),
         ("damping law", "docs/finite_elements"),
         ("friction", "docs/keys"),
         ("add format", "docs/how_to_add"),

@@ -1,8 +1,13 @@
-// How the search orders what it finds: pages of the guide before those of single names, and of pages
-// with a word in their text those of keys and terms first. The other numbers are those of Sphinx.
+// How the search orders what it finds: pages of the guide before those of single names, pages and
+// sections with all words in their title before others, and of those with the words in their text
+// keys and terms first. The other numbers are those of Sphinx.
+const WORDS = (new URLSearchParams(location.search).get("q") ?? "").toLowerCase().split(/\s+/);
 var Scorer = {
-  score: ([page, , , , score]) =>
-    score + (page.startsWith("docs/") ? 20 : 0) + (/^docs\/(keys|glossary)$/.test(page) ? 1 : 0),
+  score: ([page, title, , , score]) =>
+    score +
+    (page.startsWith("docs/") ? 20 : 0) +
+    (WORDS.every((word) => title.toLowerCase().includes(word)) ? 10 : 0) +
+    (/^docs\/(keys|glossary)$/.test(page) ? 1 : 0),
   objNameMatch: 11,
   objPartialMatch: 6,
   objPrio: { 0: 15, 1: 5, 2: -5 },

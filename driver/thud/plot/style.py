@@ -194,8 +194,8 @@ def legend_above(axes: Axes, *others: Axes, title: str = "") -> None:
 
 
 def escape_label(label: str) -> str:
-    """Return a name in words, which matplotlib neither takes for a formula nor hides."""
-    return label.replace("_", " ").lstrip().replace("$", r"\$")
+    """Return a label that matplotlib neither takes for a formula nor hides."""
+    return label.lstrip("_").replace("$", r"\$")
 
 
 def curve_style(i: int, marker_size: float = 0.0) -> dict[str, Any]:
