@@ -19,7 +19,7 @@ from hypothesis import given, settings, strategies as st
 
 import thud
 from thud import cli
-from thud.base._schema import FLOORS, GROUPS, KEYS, MODELS, OPTIONAL_GROUPS
+from thud.base._schema import FLOORS, KEYS, MODELS, OPTIONAL_GROUPS
 from thud.case.case import attribute_of
 
 if TYPE_CHECKING:
@@ -162,7 +162,9 @@ def test_keys_of_any_namelist_are_taken_or_refused(data: st.DataObject, executab
         for key in data.draw(st.lists(st.sampled_from(keys), max_size=3, unique=True))
     }
     needed = NEEDED.get(model, {})
-    texts = {key: str(needed[key.name]) for key in KEYS if key.owner == model and key.name in needed}
+    texts = {
+        key: str(needed[key.name]) for key in KEYS if key.owner == model and key.name in needed
+    }
     texts |= {key: typed(value) for key, value in stated.items()}
     wrong = data.draw(st.none() | st.sampled_from([k for k in keys if "text" not in k.kind]))
     if wrong:
@@ -182,9 +184,13 @@ def test_keys_of_any_namelist_are_taken_or_refused(data: st.DataObject, executab
             assert thud.read_case("again.nml") == thud.read_case("case.nml")
             return
         # What another key or group does not allow is named together with it.
-        names = [naming("case.nml", f"&{wrong.group}", wrong.name)] if wrong else [
-            naming("case.nml", name) for key in stated for name in (key.name, f"&{key.group}")
-        ]
+        names = (
+            [naming("case.nml", f"&{wrong.group}", wrong.name)]
+            if wrong
+            else [
+                naming("case.nml", name) for key in stated for name in (key.name, f"&{key.group}")
+            ]
+        )
         assert any(re.search(name, said) for name in names), (said, texts)
         assert "\n" not in said
         done = subprocess.run(
@@ -195,9 +201,10 @@ def test_keys_of_any_namelist_are_taken_or_refused(data: st.DataObject, executab
         assert not Path("outputs").exists()
 
 
+STUDY = "fixed.model = 'hollow_sphere'\nparameters.height.values = [0.5, 1]"
 # Files that commands find, most of them of another kind than they want.
 FILES = {
-    "case.nml": MINIMAL, "bad.nml": "&ball", "study.toml": "fixed.model = 'hollow_sphere'\nparameters.height.values = [0.5, 1]",
+    "case.nml": MINIMAL, "bad.nml": "&ball", "study.toml": STUDY,
     "bad.toml": "parameters = 3", "levels.csv": "frequency,P1\n63,65\n125,64\n250,58\n500,56\n",
     "bad.csv": "a,b\n1,x\n", "a.wav": "RIFF", "report.json": "{}",
 }  # fmt: skip
@@ -216,10 +223,10 @@ def command_lines(draw: st.DrawFn) -> list[str]:
     options = [entry for entry in known if entry[0][0].startswith("-")]
     fit = [path for path in FILES if path[path.index(".") :] in str(known[:1])]
     line += draw(st.lists(st.sampled_from(fit or WORDS) | word, min_size=len(fit) > 0, max_size=2))
-    for names, settings in draw(st.lists(st.sampled_from(options), max_size=3)) if options else ():
+    for names, how in draw(st.lists(st.sampled_from(options), max_size=3)) if options else ():
         line.append(draw(st.sampled_from(names)))
-        if "action" not in settings or settings["action"] == "append":
-            line.append(draw(st.sampled_from(settings.get("choices", WORDS)) | word))
+        if how.get("action", "append") == "append":
+            line.append(draw(st.sampled_from(how.get("choices", WORDS)) | word))
     if any(names == ("--no-figures",) for names, _ in known):
         line.append("--no-figures")
     # The explorer would serve its page.

@@ -30,37 +30,15 @@ def test_written_case_reads_back_the_same(path: Path, tmp_path: Path) -> None:
     assert thud.read_case(tmp_path / "copy.nml") == case
 
 
-def test_numbers_survive_to_the_last_bit(tmp_path: Path) -> None:
-    case = thud.Case(ball=thud.Ball(mass=2.5 + 2**-50, youngs_modulus=1e6 / 3), name="it's")
-    thud.write_case(case, tmp_path / "case.nml")
-    assert thud.read_case(tmp_path / "case.nml") == case
-
-
-def test_invalid_case_is_not_written(tmp_path: Path) -> None:
-    case = thud.Case(ball=thud.Ball(wall_thickness=0.1))
-    with pytest.raises(thud.InputError, match=naming("&ball: wall_thickness", 0.1, 0.089)):
-        thud.write_case(case, tmp_path / "case.nml")
-    assert not list(tmp_path.iterdir())
-
-
 @pytest.mark.parametrize(
     ("make", "subject", "value", "ends"),
     [
         (lambda: thud.Ball(outer_radius=-1), "ball.outer_radius", -1, (0, 10)),
-        (lambda: thud.Ball(outer_radius=0), "ball.outer_radius", 0, (0, 10)),
         (lambda: thud.Ball(wall_thickness=-1), "ball.wall_thickness", -1, (0, np.nan)),
-        (lambda: thud.Ball(mass=1e9), "ball.mass", 1e9, (1e-12, 1e6)),
         (lambda: thud.Ball(mass=10**5000), "ball.mass", np.nan, (1e-12, 1e6)),
-        (lambda: thud.Ball(poisson_ratio=0.7), "ball.poisson_ratio", 0.7, (-1, 0.5)),
         (lambda: thud.Drop(height=np.inf), "drop.height", np.nan, (1e-12, 1e6)),
-        (lambda: thud.Drop(height=np.nan), "drop.height", np.nan, (1e-12, 1e6)),
-        (lambda: thud.Plate(point_x=[1.0, -1.0]), "plate.point_x", -1, (0, 1000)),
         (lambda: thud.FiniteElement(radial_elements=-1), "mesh.radial_elements", -1, (0, 64)),
         (lambda: thud.Plate(edges="x"), "plate.edges", np.nan, (np.nan, np.nan)),  # type: ignore[arg-type]
-        (
-            lambda: thud.Case.from_namelist({"ball": {"mass": "x"}}),
-            "ball.mass", np.nan, (1e-12, 1e6),
-        ),
     ],
 )  # fmt: skip
 def test_values_are_checked_when_a_group_is_made(
@@ -94,49 +72,12 @@ def test_failed_write_leaves_nothing_behind(tmp_path: Path) -> None:
     with pytest.raises(OSError, match=r"nowhere/case\.nml"):
         thud.write_case(thud.Case(), tmp_path / "nowhere/case.nml")
     assert names_in(tmp_path) == ["case.nml"]
-    with pytest.raises(thud.InputError, match=naming(repr("a\0b"))):
-        thud.write_case(thud.Case(), "a\0b")
 
 
 @pytest.mark.parametrize("value", [None, [1.0], 1j, {}, b"2"], ids=repr)
 def test_values_of_other_types_are_refused(value: object) -> None:
     with pytest.raises(TypeError, match=naming("&ball: mass", repr(value))):
         thud.Ball(mass=value)  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("name", ["a\nb", "a\tb", "a\0b"], ids=repr)
-def test_names_are_plain_text(name: str) -> None:
-    with pytest.raises(thud.InputError, match=naming("&case: name", repr(name))):
-        thud.Case(name=name)
-
-
-LONG = 2000 * "x"
-
-
-@pytest.mark.parametrize(
-    ("text", "word"),
-    [
-        *((f"&case\n name = '{name}'\n/\n&model /", "&case: name")
-          for name in ("a" + 300 * " " + "b", "a" * 129, "a\\b", "a/b")),
-        (f"&model name = '{LONG}' /", "'hollow_sphere'"), (f"&{LONG} /", "'ball'"),
-        (f"&ball {LONG} = 1 /", "'mass'"),
-    ],
-)  # fmt: skip
-def test_long_text_is_refused_and_does_not_hide_what_is_allowed(
-    text: str, word: str, case_file: CaseFile
-) -> None:
-    with pytest.raises(thud.InputError) as refused:
-        thud.read_case(case_file(f"{text}\n"))
-    assert word in str(refused.value)
-    assert LONG[:81] not in str(refused.value)
-
-
-def test_errors_of_a_file_name_the_file(case_file: CaseFile) -> None:
-    path = case_file("&ball mass = 'x' / &drop / &model /")
-    with pytest.raises(thud.InputError, match=naming(path, "&ball: mass", "'x'", "1.0e-12")):
-        thud.read_case(path)
-    with pytest.raises(thud.InputError, match=naming("nowhere.nml")):
-        thud.read_case("nowhere.nml")
 
 
 def test_file_may_begin_with_a_byte_order_mark(case_file: CaseFile) -> None:

@@ -80,44 +80,6 @@ def test_exit_codes_are_those_of_the_executable(
     assert run(*arguments).returncode == code  # type: ignore[attr-defined]
 
 
-@pytest.mark.parametrize("arguments", [[], ["run"], ["run", "--what", "x.nml"], ["--what"]])
-def test_bad_usage_is_told(arguments: list[str], errors_of: ErrorsOf) -> None:
-    assert errors_of(*arguments).count("\n") == 1
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["run", "a.toml"], ("a.toml", "TOML file", "fit")),
-        (["run", "a.WAV"], ("a.WAV", "recording", "measure")),
-        (["run", "ball"], ("ball", "ball.nml")),
-        (["run", "folder"], ("folder", "directory", "explore")),
-        (["floor", "a.wav"], ("a.wav", "recording", "measure")),
-        (["predict", "conrete 180"], ("'concrete 180'", "floor --list")),
-        (["compare", "a.nml", "b.toml"], ("b.toml", "case or recording")),
-        (["measure", "a.nml"], ("a.nml", "case", "run")),
-        (["measure", "a.toml"], ("a.toml", "TOML file", "--config")),
-        (["measure", "a.wav", "--config", "b.wav"], ("b.wav", "recording", "TOML file")),
-        (["history", "a.csv"], ("a.csv", "recording", "report")),
-        (["rate", "a.nml"], ("a.nml", "case", "table of levels")),
-        (["explore", "a.wav"], ("a.wav", "recording", "measure")),
-        *(([name, "a.nml"], ("a.nml", "TOML file", "run")) for name in ("fit", "sweep", "design")),
-        (["x.wav"], ("x.wav", "recording", "measure")),
-        (["study.toml", "-q"], ("study.toml", "TOML file", "sweep")),
-        (["folder"], ("folder", "directory", "history")),
-        (["swep", "study.toml"], ("'sweep'",)),
-        (["dance"], ("dance", "predict")),
-    ],
-)
-def test_file_of_another_command_names_this_command(
-    arguments: list[str], words: tuple[str, ...], errors_of: ErrorsOf, tmp_path: Path
-) -> None:
-    (tmp_path / "folder").mkdir()
-    (tmp_path / "ball.nml").write_text(MINIMAL)
-    errors = errors_of(*arguments)
-    assert all(word in errors.splitlines()[-1] for word in words)
-
-
 @pytest.mark.parametrize(
     "words", [["concrete 140"], ["inputs.toml"], ["no ending", "Concrete 140"]]
 )
@@ -138,12 +100,10 @@ def test_results_that_cannot_be_saved_are_told(
     case_file: CaseFile, tmp_path: Path, errors_of: ErrorsOf
 ) -> None:
     case = str(case_file(MINIMAL))
-    (tmp_path / "file").write_text("")
     assert cli.main(["run", "-q", "-o", "old", case]) == 0
     (tmp_path / "old/force.svg").unlink()
     (tmp_path / "old/force.svg").mkdir()
-    for folder, word in ((" ", "--output"), ("file/drawn", "file/drawn"), ("old", "old/force.svg")):
-        assert word in errors_of("run", "-q", case, "-o", folder)
+    assert "old/force.svg" in errors_of("run", "-q", case, "-o", "old")
 
 
 @pytest.mark.parametrize("unbuffered", ["", "1"])

@@ -6,7 +6,6 @@ import dataclasses
 import os
 import sys
 import xml.etree.ElementTree as ET
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import f90nml
@@ -19,6 +18,8 @@ import thud
 from thud import cli
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from conftest import CaseFile, Run
 
 COARSE = {"radial_elements": 2, "polar_elements": 16}
@@ -84,12 +85,9 @@ def test_snapshots_are_files_for_anybody(tmp_path: Path) -> None:
         assert not pressure[:, :-1].any()
         cavity = data["cavity_pressure"].reshape(17, 3)
         assert (cavity == [motion.cavity_pressure[i], 0, 0]).all()
-    with pytest.raises(thud.InputError, match=naming("ball.vtu", "pvd")):
-        motion.save("ball.vtu")
 
 
-def test_mode_shapes_are_grids_for_anybody(case_file: CaseFile) -> None:
-    assert cli.main(["run", "-q", str(case_file(MODES))]) == 0
+def test_mode_shapes_are_grids_for_anybody() -> None:
     modes = thud.free_modes(count=3)
     modes.save("modes.vtu")
     grid = meshio.read("modes.vtu")
@@ -97,22 +95,12 @@ def test_mode_shapes_are_grids_for_anybody(case_file: CaseFile) -> None:
     for i, (name, shape) in enumerate(grid.point_data.items()):
         assert name == f"mode {i + 1}, {modes.frequency[i]:.3f} Hz"
         np.testing.assert_array_equal(shape[:, :2], modes.shape[i].reshape(-1, 2))
-    table = np.genfromtxt("outputs/case/modes.csv", delimiter=",", names=True, dtype=None)
-    assert table["mode"].tolist() == [1, 2, 3]
-    np.testing.assert_array_equal(table["frequency_Hz"], modes.frequency)
-    np.testing.assert_array_equal(table["pole_participation"], modes.participation)
-    assert table["harmonic"].tolist() == [2, 3, 4]
 
 
 def test_missing_package_of_meshes_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "meshio", None)
     with pytest.raises(thud.InputError, match=naming("meshio")):
         thud.free_modes().save("modes.vtu")
-
-
-def test_modulus_that_vanishes_is_refused() -> None:
-    with pytest.raises(thud.InputError, match=naming("&ball: youngs_modulus")):
-        thud.solve(model=thud.FiniteElement(**COARSE), ball=thud.Ball(youngs_modulus=5e-324))
 
 
 def test_modes_alone_need_no_drop(
@@ -128,8 +116,12 @@ def test_modes_alone_need_no_drop(
     assert [float(row.split()[1]) for row in rows] == [
         float(f"{frequency:.2f}") for frequency in modes.frequency
     ]
-    effective = f90nml.read("outputs/case/effective.nml")
-    assert sorted(effective) == ["ball", "case", "modes"]
+    assert sorted(f90nml.read("outputs/case/effective.nml")) == ["ball", "case", "modes"]
+    table = np.genfromtxt("outputs/case/modes.csv", delimiter=",", names=True, dtype=None)
+    assert table["mode"].tolist() == [1, 2, 3]
+    np.testing.assert_array_equal(table["frequency_Hz"], modes.frequency)
+    np.testing.assert_array_equal(table["pole_participation"], modes.participation)
+    assert table["harmonic"].tolist() == [2, 3, 4]
 
 
 def test_modes_and_impact_come_from_one_file(case_file: CaseFile, tmp_path: Path) -> None:
@@ -218,49 +210,6 @@ def test_pressure_is_even_at_the_pole() -> None:
     assert 0 < missing[1] < missing[0] < 0.1
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        (IMPACT.replace("elements = 2", "elements = 1"), naming("&mesh: radial_elements", 2)),
-        (f"{IMPACT}&material bulk_ratio = 1e9 /", naming("&material: bulk_ratio")),
-        (f"{IMPACT}&contact friction = -0.1 /", naming("&contact: friction")),
-        (
-            f"{IMPACT}&finite_element flight_before = 0.9 /",
-            naming("&finite_element: flight_before", "0.9 s"),
-        ),
-        (f"{IMPACT}&finite_element bounces = 3 /", naming("contact 3")),
-        (f"{IMPACT}&sampling duration = 0.01 /", naming("&sampling: duration", "0.01 s")),
-        (f"{IMPACT}&modes count = 101 /", naming("&modes: count", 101)),
-        (f"{IMPACT}&hollow_sphere momentum_flux = 'none' /", naming("&hollow_sphere", "line")),
-        ("&ball /\n&modes /\n&drop /\n", naming("&drop", "line 3", "&modes")),
-        ("&ball /\n&modes /\n&mesh /\n", naming("&mesh", "line 3", "&modes")),
-        ("&ball wall_thickness = 8e-5 /\n&modes /\n", naming("wall_thickness", "8.9e-5")),
-        ("&modes /\n&mdel /\n", naming("&mdel", "line 2", "'model'")),
-        ("&ball /\n&drop /\n&model /\n&mesh /\n", naming("&mesh", "line 4")),
-        (IMPACT.replace("&ball", "&ball youngs_modulus = 1e3"), naming("duration", "0.05 s")),
-        (IMPACT.replace("&drop", "&drop height = 1e3"), naming("&finite_element", "ms")),
-        (
-            IMPACT.replace("&ball", "&ball youngs_modulus = 1e13")
-            + "&material viscosity = 'kelvin_voigt' /",
-            naming("&finite_element", "s", "steps"),
-        ),
-    ],
-)
-def test_impossible_cases_get_one_sentence(text: str, words: str) -> None:
-    """Ranges, lists of branches, rates and snapshots are those of the Fortran tests."""
-    Path("case.nml").write_text(f"{text}\n", encoding="utf-8")
-    with pytest.raises(thud.ThudError, match=words) as caught:
-        thud.solve(thud.read_case("case.nml"))
-    assert "\n" not in str(caught.value)
-
-
-def test_record_too_short_for_any_contact_is_told_before_it_is_computed() -> None:
-    # Ten elements of 0.4 µm would take minutes to the same end.
-    ball = thud.Ball(wall_thickness=4e-7)
-    with pytest.raises(thud.InputError, match=naming("&sampling: duration", "0.05 s")):
-        thud.solve(ball, model="finite_element", radial_elements=4, polar_elements=10)
-
-
 def test_modes_have_the_shapes_of_their_nodes() -> None:
     count = 3
     ball = thud.Ball(poisson_ratio=0.45)
@@ -282,16 +231,6 @@ def test_modes_have_the_shapes_of_their_nodes() -> None:
         assert shape[[0, -1], :, 0] == pytest.approx(0, abs=1e-9)
         assert shape[0, -1, 1] > 0
     assert (np.diff(found.frequency) > 0).all()
-    rows = found.rows()[1:]
-    assert [float(row[0]) for row in rows] == pytest.approx(found.frequency, abs=0.006)
-    assert [int(row[1]) for row in rows] == found.harmonic.tolist()
-    assert [float(row[2]) for row in rows] == pytest.approx(found.participation, abs=6e-4)
-
-
-@pytest.mark.parametrize("frequency", [[], [0.0], [10.0, -1.0], [[10.0]], "a", [np.nan]])
-def test_loss_factors_are_of_positive_frequencies(frequency: object) -> None:
-    with pytest.raises(thud.InputError, match="frequency"):
-        thud.loss_factors(thud.FiniteElement(), frequency)  # type: ignore[arg-type]
 
 
 def test_drops_at_the_same_time_equal_those_one_after_the_other(tmp_path: Path) -> None:

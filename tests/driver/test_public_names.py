@@ -9,16 +9,13 @@ import os
 import pydoc
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, get_origin
+from typing import get_origin
 
 import pytest
 from conftest import REPOSITORY, naming, python
 
 import thud
 from thud.base._schema import MODELS
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 DRIVER = REPOSITORY / "driver"
 SCRIPT = Path(__file__).with_name("user_script.py")
@@ -166,34 +163,6 @@ def test_names_whose_packages_are_missing_say_so() -> None:
     lines = done.stdout.splitlines()
     assert [re.match(r"\w+", line)[0] for line in lines] == [*3 * ["xarray"], "pandas"]  # type: ignore[index]
     assert all(line.endswith("pip install 'thud[studies]'") for line in lines)
-
-
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda: thud.solve(height=1.0), naming("'height'", "&drop")),
-        (lambda: thud.solve(bounces=2), naming("'bounces'", "finite_element")),
-        (lambda: thud.solve(frequeny=1, model="measured_modes"), naming("'frequency'")),
-        (lambda: thud.solve(model="Hollow_Sphere"), naming("'Hollow_Sphere'", "'modal_ball'")),
-        (lambda: thud.solve_many({"heigth": 1}), naming("'heigth'", "'height'")),
-        (lambda: thud.get_bands("octav"), naming("'octav'", "'octave'", "'third'")),
-        (lambda: thud.solve().assess("rubberball"), naming("'rubberball'", "'rubber_ball'")),
-        (lambda: thud.fit(thud.solve(), ["mas"]), naming("mas", "'mass'")),
-        (lambda: thud.read_study({}, "swep"), naming("'swep'", "'sweep'")),
-        (
-            lambda: thud.sweep({"parameters": {"height": {"vales": [1]}}}),
-            naming("height", "'vales'", "'values'", "low"),
-        ),
-        (lambda: thud.sweep({}, worker=2), naming("'worker'", "'workers'")),
-        (
-            lambda: thud.solve(model=thud.FiniteElement(), bounces=2),
-            naming("FiniteElement", "bounces"),
-        ),
-    ],
-)
-def test_misplaced_and_misspelt_words_are_told(call: Callable[[], object], words: str) -> None:
-    with pytest.raises(thud.InputError, match=words):
-        call()
 
 
 @pytest.mark.parametrize(
