@@ -128,32 +128,41 @@ def test_full_disk_is_reported_and_loses_nothing(
     assert values(thud.sweep(tmp_path / "long.toml", tmp_path).dataset).identical(values(whole))
 
 
-def test_results_of_another_study_are_not_touched(tmp_path: Path) -> None:
-    thud.sweep({"name": "a", **HEIGHTS}, tmp_path)
-    before = (tmp_path / "a.nc").read_bytes()
-    other = {"name": "a", "parameters": {"height": {"values": [1]}}}
-    words = naming("a.nc", "[parameters] height", "(0.5, 1.0)", "(1.0,)", "--replace")
-    with pytest.raises(thud.InputError, match=words):
-        thud.sweep(other, tmp_path)
-    (tmp_path / "a.nc").rename(tmp_path / "b.nc")
-    with pytest.raises(thud.InputError, match=naming("b.nc", "--replace")):
-        thud.sweep({**other, "name": "b"}, tmp_path)
-    assert (tmp_path / "b.nc").read_bytes() == before
-    (tmp_path / "c.nc").write_text("no dataset")
-    with pytest.raises(thud.InputError, match=naming("c.nc", "--replace")):
-        thud.sweep({**other, "name": "c"}, tmp_path)
-    (tmp_path / "d.partial").mkdir()
-    block = tmp_path / "d.partial/block_000000000000.nc"
-    block.write_bytes(before)
-    with pytest.raises(thud.InputError, match=naming("d.partial", "height", "--replace")):
-        thud.sweep({**other, "name": "d"}, tmp_path)
-    assert block.read_bytes() == before
+OTHER = {"parameters": {"height": {"values": [1]}}}
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("a.nc", ["[parameters] height", "(0.5, 1.0)", "(1.0,)"]), ("b.nc", []), ("c.nc", []),
+     ("d.partial", ["height"])],
+)  # fmt: skip
+def test_results_of_another_study_are_not_touched(
+    name: str, words: list[str], tmp_path: Path
+) -> None:
+    """Neither under their name or another one, nor a file of something else, nor a block."""
+    path = thud.sweep({"name": "a", **HEIGHTS}, tmp_path) and tmp_path / "a.nc"
+    place = tmp_path / name
+    if name == "c.nc":
+        path.write_text("a paper")
+    if name == "d.partial":
+        place.mkdir()
+        place /= "block_000000000000.nc"
+    path.rename(place)
+    before = place.read_bytes()
+    study = {"name": name[0], **OTHER}
+    with pytest.raises(thud.InputError, match=naming(name, *words, "--replace")):
+        thud.sweep(study, tmp_path)
+    assert place.read_bytes() == before
+    assert thud.sweep(study, tmp_path, replace=True).dataset.sizes["height"] == 1
+
+
+def test_half_a_block_is_no_result(tmp_path: Path) -> None:
     (tmp_path / "e.partial").mkdir()
     # Kills leave half a file.
     (tmp_path / "e.partial/.block_000000000000.nc.1.new").write_text("")
     with pytest.raises(thud.InputError, match=naming("e.partial", "samples")):
         thud.read_sweep(tmp_path / "e.partial")
-    assert thud.sweep({**other, "name": "e"}, tmp_path).dataset.sizes["height"] == 1
+    assert thud.sweep({"name": "e", **OTHER}, tmp_path).dataset.sizes["height"] == 1
     assert not (tmp_path / "e.partial").exists()
 
 
@@ -174,14 +183,6 @@ def test_replace_keeps_what_is_of_this_version(tmp_path: Path) -> None:
     before = (tmp_path / "python.nc").read_bytes()
     thud.sweep(study, tmp_path, replace=True)
     assert (tmp_path / "python.nc").read_bytes() == before
-
-
-def test_files_of_something_else_are_replaced_on_request_only(tmp_path: Path) -> None:
-    (tmp_path / "python.nc").write_text("a paper")
-    with pytest.raises(thud.InputError, match=naming("python.nc", "--replace")):
-        thud.sweep(HEIGHTS, tmp_path)
-    assert (tmp_path / "python.nc").read_text() == "a paper"
-    assert thud.sweep(HEIGHTS, tmp_path, replace=True).dataset.sizes["height"] == 2
 
 
 @pytest.mark.parametrize("name", ["python.partial", "python.nc"])

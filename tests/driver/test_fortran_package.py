@@ -5,15 +5,12 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import pytest
 from conftest import REPOSITORY
 
 import thud
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 EXAMPLE = REPOSITORY / "docs/examples/fortran"
 
@@ -26,33 +23,19 @@ def run(*command: str | Path, cwd: Path | None = None) -> str:
 
 
 def build(source: Path, *options: str) -> Path:
-    """Return the directory in which a project was built."""
+    """Return the directory in which a project was built, quickly and without optimization."""
     place = source / "build"
-    run(
-        "cmake",
-        "-S",
-        source,
-        "-B",
-        place,
-        "-G",
-        "Ninja",
-        f"-DPython_EXECUTABLE={sys.executable}",
-        *options,
-    )
+    options += (f"-DPython_EXECUTABLE={sys.executable}", "-DCMAKE_BUILD_TYPE=MinSizeRel")
+    options += ("-DCMAKE_Fortran_FLAGS_MINSIZEREL=-O0",)
+    run("cmake", "-S", source, "-B", place, "-G", "Ninja", *options)
     run("cmake", "--build", place)
-    return place
-
-
-def copy_example(place: Path) -> Path:
-    """Return a copy of the example."""
-    shutil.copytree(EXAMPLE, place)
     return place
 
 
 @pytest.fixture(scope="module")
 def embedded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the build of the example with the sources of thud inside."""
-    source = copy_example(tmp_path_factory.mktemp("embedded") / "drop")
+    source = Path(shutil.copytree(EXAMPLE, tmp_path_factory.mktemp("embedded") / "drop"))
     lists = source / "CMakeLists.txt"
     text = lists.read_text(encoding="utf-8")
     wanted = "find_package(thud REQUIRED)"
@@ -85,11 +68,14 @@ def test_the_sources_are_part_of_another_project(embedded: Path) -> None:
     assert run(embedded / "drop") == expected()
 
 
+@pytest.mark.slow
 def test_another_project_finds_the_installed_package(installed: Path, tmp_path: Path) -> None:
-    place = build(copy_example(tmp_path / "drop"), f"-DCMAKE_PREFIX_PATH={installed}")
+    source = Path(shutil.copytree(EXAMPLE, tmp_path / "drop"))
+    place = build(source, f"-DCMAKE_PREFIX_PATH={installed}")
     assert run(place / "drop") == expected()
 
 
+@pytest.mark.slow
 def test_pkg_config_names_all_that_is_needed(installed: Path, tmp_path: Path) -> None:
     (description,) = installed.rglob("thud.pc")
     flags = run("pkg-config", "--static", "--cflags", "--libs", description).split()
@@ -97,6 +83,7 @@ def test_pkg_config_names_all_that_is_needed(installed: Path, tmp_path: Path) ->
     assert run(tmp_path / "drop") == expected()
 
 
+@pytest.mark.slow
 def test_the_executable_of_the_installed_tree_runs(installed: Path) -> None:
     assert run(installed / "bin/thud", "--version").split()[1] == thud.__version__
     made = REPOSITORY / "share/man/man1/thud.1"

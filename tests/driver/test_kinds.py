@@ -7,7 +7,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from conftest import REPOSITORY, names_in, naming, python
+from conftest import REPOSITORY, names_in, python
 
 import thud
 from thud import cli
@@ -20,11 +20,6 @@ def test_every_kind_follows_from_its_line(name: str) -> None:
     assert result_type(name) is getattr(thud, name.capitalize())
     assert callable(getattr(thud, name))
     assert cli.COMMANDS[name].help == KINDS[name].help
-
-
-def test_unknown_kind_is_reported() -> None:
-    with pytest.raises(thud.InputError, match=naming("kind", "'cube'", "'sweep'")):
-        thud.read_study({}, "cube")
 
 
 @pytest.mark.parametrize(

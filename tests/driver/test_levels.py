@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 import xarray as xr
-from conftest import naming
 
 import thud
 from thud.base._schema import LIMITS
@@ -73,8 +72,6 @@ def test_nominal_tyre_conforms() -> None:
     assert not thud.assess_levels([47, 40, 22, 11.5, 5.5], 0.02, 0.8, 2, 7.3, 0.85, source="tyre")
     levels = xr.DataArray([47, 40, 22, 11.5, 5.5])
     assert thud.assess_levels(levels, 0.02, 0.8, 1, 7.3, 0.85, source="tyre")
-    with pytest.raises(thud.InputError, match="levels"):
-        thud.assess_levels(levels[0], 0.02, 0.8, 1, 7.3, 0.85)
 
 
 def criteria_of(source: LimitsSource, **changes: float) -> thud.Verdict:
@@ -123,7 +120,7 @@ def test_verdict_is_undecided_if_all_known_criteria_conform() -> None:
         found = Verdict("rubber_ball", criteria)
         assert found.conforms == result
         if result == "undecided":
-            with pytest.raises(thud.InputError, match=naming("undecided")):
+            with pytest.raises(thud.InputError):
                 bool(found)
         else:
             assert bool(found) == (result == "conforms")
