@@ -31,13 +31,8 @@ def test_run_writes_results_and_figures(
     output = capsys.readouterr().out
     assert re.search(r"level, 31\.5 Hz octave +38\.70 dB +38 to 40 +conforms +38\.53 dB", output)
     assert "does not conform" in output
-
-
-def test_run_writes_the_same_bytes_again(case_file: CaseFile, tmp_path: Path) -> None:
-    arguments = ["run", "-q", str(case_file(MINIMAL, "ball.nml"))]
-    assert cli.main(arguments) == 0
     before = contents(tmp_path / "outputs/ball")
-    assert cli.main(arguments) == 0
+    assert cli.main(["run", "-q", "ball.nml"]) == 0
     assert contents(tmp_path / "outputs/ball") == before
 
 
@@ -45,8 +40,7 @@ def test_run_agrees_with_the_executable(run: Run, case_file: CaseFile, tmp_path:
     case = case_file(MINIMAL)
     assert cli.main(["run", "-q", "--no-figures", "-o", "driver", str(case)]) == 0
     run(case, "-o", "executable")
-    for path in (tmp_path / "executable").iterdir():
-        assert path.read_bytes() == (tmp_path / "driver" / path.name).read_bytes()
+    assert contents(tmp_path / "executable") == contents(tmp_path / "driver")
 
 
 def test_bad_case_does_not_stop_the_others(
@@ -91,11 +85,6 @@ def test_name_of_a_construction_is_a_floor(words: list[str], tmp_path: Path) -> 
     assert (tmp_path / "outputs/prediction").is_dir()
 
 
-def test_version_is_that_of_the_library(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["--version"]) == 0
-    assert capsys.readouterr().out.strip() == f"thud {thud.__version__}"
-
-
 def test_results_that_cannot_be_saved_are_told(
     case_file: CaseFile, tmp_path: Path, errors_of: ErrorsOf
 ) -> None:
@@ -106,15 +95,17 @@ def test_results_that_cannot_be_saved_are_told(
     assert "old/force.svg" in errors_of("run", "-q", case, "-o", "old")
 
 
-@pytest.mark.parametrize("unbuffered", ["", "1"])
 # All of them write to standard output; runs of two cases are told once.
-@pytest.mark.parametrize("arguments", ["--version", "fit --help", "run --no-figures a.nml b.nml"])
+@pytest.mark.parametrize(
+    ("arguments", "unbuffered"),
+    [("--version", "1"), ("fit --help", ""), *(("run --no-figures a.nml b.nml", u) for u in "01")],
+)
 def test_full_screen_is_told_in_one_sentence(
     arguments: str, unbuffered: str, case_file: CaseFile, tmp_path: Path
 ) -> None:
     for name in ("a.nml", "b.nml"):
         case_file(MINIMAL, name)
-    environment = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
+    environment = {**os.environ, "PYTHONUNBUFFERED": unbuffered.strip("0")}
     command = [sys.executable, "-m", "thud", *arguments.split()]
     with Path("/dev/full").open("w", encoding="utf-8") as screen:
         done = subprocess.run(

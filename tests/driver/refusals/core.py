@@ -10,13 +10,14 @@ import numpy as np
 from conftest import MINIMAL
 
 import thud
+from thud.base.files import Results
 from thud.level.levels import peak_count
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 # What is only imported for the table.
-__all__ = ["MINIMAL", "inf", "nan", "np", "peak_count"]
+__all__ = ["MINIMAL", "Results", "inf", "nan", "np", "peak_count"]
 
 PULSE = np.sin(np.pi * np.linspace(0, 1, 883))
 
