@@ -35,8 +35,9 @@ from thud.base.errors import InputError
 from thud.recordings.calibration import calibrate
 from thud.recordings.plate_tap import calibrate_tap
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "validation"))
-from recorder_conditions import FLAT, STATIC, Condition, conditions
+sys.path += [str(Path(__file__).parents[1] / name) for name in ("faults", "validation")]
+from damage import toml
+from recorder_conditions import FLAT, STATIC, Condition, Contact, conditions
 from recorder_model import (
     GRAVITY,
     KINDS,
@@ -98,9 +99,8 @@ class Value:
 
     def is_within(self, deviations: float) -> bool:
         """Whether the error is within so many deviations of a normal distribution."""
-        factor = deviations
-        if math.isfinite(self.freedom):
-            factor = float(stdtrit(self.freedom, ndtr(deviations)))
+        is_normal = math.isinf(self.freedom)
+        factor = deviations if is_normal else float(stdtrit(self.freedom, ndtr(deviations)))
         return abs(self.error) <= factor * self.uncertainty + 1e-12
 
     def is_inside(self) -> bool:
@@ -187,9 +187,9 @@ def record(
             return _write_cells(condition, force, folder / name, chain, rng)
         values = electric(force, chain, condition.scene, one.duration, rng)
         if condition.fault:
-            first, stop = (condition.scene.before + end for end in (0.0, one.duration))
-            contact = (int(end * chain.rate) + 1 for end in (first, stop))
-            values = condition.fault(values, chain.rate, *contact, rng)
+            before = condition.scene.before
+            first, stop = (int(end * chain.rate) + 1 for end in (before, before + one.duration))
+            values = condition.fault(values, Contact(chain.rate, first, stop, rng))
         return _write(values, folder / name, chain, config, condition.files)
 
     if condition.cells or condition.files in {"one", "table"}:
@@ -200,7 +200,7 @@ def record(
     else:
         paths = _copies(take(_varied(pulse, rng), "drop"), condition.files, chain)
     path = folder / "lab.toml"
-    path.write_text(toml(config), encoding="utf-8")
+    path.write_text(toml({key: value for key, value in config.items() if value is not None}))
     return paths, path, truth
 
 
@@ -237,23 +237,6 @@ def kind_of(condition: Condition, seed: int) -> str:
     return condition.kind or KINDS[(zlib.crc32(condition.name.encode()) + seed) % len(KINDS)]
 
 
-def toml(table: Mapping[str, Any], prefix: str = "") -> str:
-    """Return a configuration as TOML; keys without a value are left out."""
-
-    def text(value: object) -> str:
-        if isinstance(value, str):
-            return f'"{value}"'
-        if isinstance(value, list | tuple):
-            return f"[{', '.join(map(text, value))}]"
-        return repr(value)
-
-    plain = {key: value for key, value in table.items() if not isinstance(value, dict)}
-    lines = [f"{key} = {text(value)}" for key, value in plain.items() if value is not None]
-    tables = {key: value for key, value in table.items() if isinstance(value, dict)}
-    lines += [f"[{prefix}{key}]\n{toml(value)}" for key, value in tables.items()]
-    return "\n".join(lines) + "\n"
-
-
 def _varied(pulse: Pulse, rng: np.random.Generator) -> Pulse:
     """Return a further drop of the same ball: the contact time varies by 1 %."""
     stretch = 1 + 0.01 * rng.normal()
@@ -261,15 +244,12 @@ def _varied(pulse: Pulse, rng: np.random.Generator) -> Pulse:
 
 
 def _write(values: Array, stem: Path, chain: Chain, config: dict[str, Any], files: str) -> Path:
-    codes_ = convert(values, chain)
+    whole = convert(values, chain)
     if files == "table":
         config["calibration"] = f"{chain.full_scale / 10!r} N/V"
-        path, volts = stem.with_suffix(".csv"), codes_ * (10.0 / 2 ** (chain.bits - 1))
-        write_table(path, {"Plate [V]": volts}, chain.rate)
-        return path
-    path = stem.with_suffix(".wav")
-    write_sound(path, codes_, chain)
-    return path
+        columns = {"Plate [V]": whole * (10.0 / 2 ** (chain.bits - 1))}
+        return write_table(stem.with_suffix(".csv"), columns, chain.rate)
+    return write_sound(stem.with_suffix(".wav"), whole, chain)
 
 
 def _write_cells(
@@ -280,15 +260,12 @@ def _write_cells(
     assert cells is not None
     volts = cells.volts(force, chain, rng)
     newtons = volts / np.array(cells.sensitivities)[:, None]
-    path = stem.with_suffix(".wav" if condition.files == "sound" else ".csv")
     if condition.files == "sound":
-        write_sound(path, convert(newtons, chain).T, chain)
-        return path
-    unit, values = ("N", newtons) if condition.files == "newtons" else ("V", volts)
-    step = 10 / 2**23 if unit == "V" else 0.001
-    titles = (f"F{k} [{unit}]" for k in range(1, 5))
-    write_table(path, dict(zip(titles, np.rint(values / step) * step, strict=True)), chain.rate)
-    return path
+        return write_sound(stem.with_suffix(".wav"), convert(newtons, chain).T, chain)
+    is_force = condition.files == "newtons"
+    unit, values, step = ("N", newtons, 0.001) if is_force else ("V", volts, 10 / 2**23)
+    columns = {f"F{k} [{unit}]": np.rint(one / step) * step for k, one in enumerate(values, 1)}
+    return write_table(stem.with_suffix(".csv"), columns, chain.rate)
 
 
 def _copies(path: Path, files: str, chain: Chain) -> list[Path]:
@@ -334,12 +311,12 @@ def compare(recording: Any, truth: Truth) -> Iterator[tuple[str, Value]]:  # noq
             error = float(one.value - true[quantity])
             error = min(error, 0.0) if one.upper_bound else error
             yield quantity, Value(error, one.uncertainty, quantity in concerned, one.freedom)
-    peaks = [drop.peak_force for drop in recording.drops]
-    count = len(peaks)
-    mean = float(np.mean([peak.value for peak in peaks]))
-    variance = float(np.mean([peak.uncertainty**2 for peak in peaks])) / count
-    if count > 1:
-        variance += float(np.var([peak.value for peak in peaks], ddof=1)) / count
+    peaks = np.array(
+        [(one.peak_force.value, one.peak_force.uncertainty) for one in recording.drops]
+    )
+    count, mean = len(peaks), float(peaks[:, 0].mean())
+    variance = float((peaks[:, 1] ** 2).mean()) / count
+    variance += float(peaks[:, 0].var(ddof=1)) / count if count > 1 else 0.0
     relative = math.hypot(math.sqrt(variance) / mean, recording.calibration_uncertainty or 0.0)
     freedom = count - 1 if count > 1 else math.inf
     yield PEAK, Value(mean / truth.peak - 1, relative, PEAK in concerned, freedom)
@@ -348,9 +325,9 @@ def compare(recording: Any, truth: Truth) -> Iterator[tuple[str, Value]]:  # noq
 def _calibrated(
     condition: Condition, folder: Path, rng: np.random.Generator
 ) -> tuple[dict[str, Value], tuple[Note, ...]]:
-    weight, chain, path = condition.weight, condition.chain, folder / "weight.wav"
+    weight, chain = condition.weight, condition.chain
     assert weight is not None
-    write_sound(path, convert(weight_record(weight, chain, rng), chain), chain)
+    path = _write(weight_record(weight, chain, rng), folder / "weight", chain, {}, "one")
     found = calibrate(path, force=weight.mass * GRAVITY, uncertainty=1e-4, unit="FS")
     error = float(found.chain.split()[0]) / chain.full_scale - 1
     concerned = any(CALIBRATION in concern(note) for note in found.notes if note.is_warning)
@@ -360,9 +337,9 @@ def _calibrated(
 def _tapped(
     condition: Condition, folder: Path, rng: np.random.Generator
 ) -> tuple[dict[str, Value], tuple[Note, ...]]:
-    chain, path = condition.chain, folder / "tap.wav"
-    write_sound(path, convert(tap_record(condition.taps, chain, rng), chain), chain)
-    found, mode = calibrate_tap(path), chain.modes[0]
+    chain, mode = condition.chain, condition.chain.modes[0]
+    record = tap_record(condition.taps, chain, rng)
+    found = calibrate_tap(_write(record, folder / "tap", chain, {}, "one"))
     # As an error of the recorder's clock.
     clock = 1 + CLOCK * rng.normal()
     return {
@@ -384,8 +361,9 @@ def summary(outcomes: list[Outcome]) -> Iterator[str]:
     def row(*cells: object) -> str:
         return f"| {' | '.join(map(str, cells))} |"
 
-    yield row("conditions", "records", "refused", *columns, "silent", "warned", "miscounted")
-    yield row(*["---"] * (6 + len(columns)))
+    yield row("conditions", "records", "refused", *columns, "silent", "warned", "miscounted",
+              "said to ring")  # fmt: skip
+    yield row(*["---"] * (7 + len(columns)))
     groups = defaultdict(list)
     for outcome in outcomes:
         name = outcome.condition.group.removesuffix(" untold")
@@ -400,36 +378,29 @@ def summary(outcomes: list[Outcome]) -> Iterator[str]:
         refused = sum(bool(outcome.refusal) for outcome in members)
         silent = sum(len(outcome.silent) for outcome in members)
         others = sum(o.warned for o in members), sum(o.miscounted for o in members)
-        yield row(name, len(members), refused, *cells, silent, *others)
+        rings = sum(any(code.startswith("plate_rings") for code in o.warnings) for o in members)
+        yield row(name, len(members), refused, *cells, silent, *others, rings)
 
 
 def by_chance(outcomes: list[Outcome]) -> float:
     """Return how many errors are silent on average if all are normal with their uncertainties."""
     values = [pair for outcome in outcomes for pair in outcome.values.items()]
-    tails = [
+    return sum(
         2 * float(ndtr(-max(DEVIATIONS, MATERIAL[quantity] / value.uncertainty)))
-        for quantity, value in values
-        if value.uncertainty and not value.concerned
-    ]
-    return sum(tails)
+        for quantity, value in values if value.uncertainty and not value.concerned
+    )  # fmt: skip
 
 
 def coverage(outcomes: list[Outcome]) -> Iterator[tuple[str, bool]]:
     """Yield a line for each quantity of the told records, and whether it is within the limits."""
     for quantity in MATERIAL:
-        values = [o.values[quantity] for o in outcomes if quantity in o.values]
-        if not values:
+        inside = [o.values[quantity].is_inside() for o in outcomes if quantity in o.values]
+        if not inside:
             continue
-        fraction = float(np.mean([value.is_inside() for value in values]))
-        chance = 1.96 * math.sqrt(0.95 * 0.05 / len(values))
+        fraction, chance = float(np.mean(inside)), 1.96 * math.sqrt(0.95 * 0.05 / len(inside))
         met = COVERAGE[0] - chance <= fraction <= COVERAGE[1] + chance
-        yield (
-            (
-                f"{quantity:12s} {100 * fraction:5.1f} % of {len(values)} (93 to 97 %, "
-                f"± {100 * chance:.1f} % by chance){'' if met else ': missed'}"
-            ),
-            met,
-        )
+        limits = f"(93 to 97 %, ± {100 * chance:.1f} % by chance){'' if met else ': missed'}"
+        yield f"{quantity:12s} {100 * fraction:5.1f} % of {len(inside)} {limits}", met
 
 
 def main() -> int:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import thud
 
@@ -89,3 +90,17 @@ def fault_of(error: thud.ThudError, path: str, given: str) -> str:
         (isinstance(error, thud.InputError) and len(REMEDY.findall(said)) != 1, "has no remedy"),
     ]
     return "; ".join(f"{what}: {said!r}" for is_so, what in wrong if is_so)
+
+
+def toml(table: dict[str, Any]) -> str:
+    """Return tables as TOML; tables in tables stand in one line."""
+
+    def text(value: object) -> str:
+        if isinstance(value, dict):
+            return f"{{{', '.join(f'{json.dumps(k)} = {text(v)}' for k, v in value.items())}}}"
+        if isinstance(value, list):
+            return f"[{', '.join(map(text, value))}]"
+        plain = json.dumps(value, ensure_ascii=False)
+        return plain.replace("NaN", "nan").replace("Infinity", "inf")
+
+    return "".join(f"{json.dumps(key)} = {text(value)}\n" for key, value in table.items())

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from damage import INNER, WORDS, damaged, damaged_text, fault_of
+from damage import INNER, WORDS, damaged, damaged_text, fault_of, toml
 from injection import executable
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "driver"))
@@ -194,7 +194,7 @@ def read_studies(chance: random.Random) -> tuple[str, str]:
             table["design"] = table.get("design", {}) | {"size": chance.choice([1, 4, 8])}
         for _ in range(chance.choice([0, 1, 1, 2, 4])):
             _damage(table, chance)
-        text = _toml(table)
+        text = toml(table)
     if chance.random() < 0.5:
         text = damaged_text(text, chance)
     content = text.encode(errors="surrogateescape")
@@ -245,17 +245,3 @@ def _damage(table: dict[str, Any], chance: random.Random) -> None:
         table.pop(name, None)
     else:
         table[name] = json.loads(json.dumps(chance.choice([*ODD, chance.choice(WORDS)])))
-
-
-def _toml(table: dict[str, Any]) -> str:
-    """Return tables as TOML; tables in tables stand in one line."""
-
-    def text(value: object) -> str:
-        if isinstance(value, dict):
-            return f"{{{', '.join(f'{json.dumps(k)} = {text(v)}' for k, v in value.items())}}}"
-        if isinstance(value, list):
-            return f"[{', '.join(map(text, value))}]"
-        plain = json.dumps(value, ensure_ascii=False)
-        return plain.replace("NaN", "nan").replace("Infinity", "inf")
-
-    return "".join(f"{json.dumps(key)} = {text(value)}\n" for key, value in table.items())

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import product
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import scipy.signal
 from recorder_model import KINDS, Cells, Chain, Filter, Mode, Scene, Weight
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Mapping
 
+    from numpy.typing import NDArray
     from recorder_model import Array
-
-    # Values, N, samples per second, first and stop index of the contact, random numbers.
-    Fault = Callable[[Array, float, int, int, np.random.Generator], Array]
 
 # Plate, amplifier and filter where a condition has no other: stated unless it is about them. Flat
 # up to FLAT, Hz, and static.
@@ -28,63 +27,47 @@ STATIC = 1e6
 REFUSABLE = {"clipping", "duplicates", "channels", "offset step", "calibrate", "samples"}
 
 
+class Contact(NamedTuple):
+    """Samples per second, first and stop index of the contact, and random numbers."""
+
+    rate: float
+    first: int
+    stop: int
+    rng: np.random.Generator
+
+    def noise(self, values: Array) -> Array:
+        """Return normal noise of deviation 1."""
+        return self.rng.normal(size=len(values))
+
+
+# Damages values, N.
+Fault = Callable[["Array", Contact], "NDArray[Any]"]
+
+
 @dataclass(frozen=True)
 class Condition:
-    """What is recorded, and what the configuration states of it.
+    """What is recorded, and what the configuration states of it."""
 
-    Attributes
-    ----------
-    group, name : str
-        Part of the campaign, and the condition.
-    told : bool
-        Whether everything is stated.
-    chain, scene : Chain, Scene
-        Recorder, and what it goes through.
-    kind : str
-        Kind of the pulse; empty: each in turn.
-    ball : mapping
-        Attributes of the ball that are not random.
-    config : mapping
-        Keys of the configuration, besides those of any recording.
-    uncertainties : mapping
-        Standard uncertainties that are stated, and from which errors are drawn: calibration
-        (relative), mass, kg, height, m, f0 and cutoff of the filter (relative).
-    cells : Cells or None
-        Load cells in channels of their own.
-    plate_told, filter_told : bool
-        Whether plate and filter are stated.
-    files : str
-        ``"one"``, ``"table"``, or a kind of copies.
-    weight : Weight or None
-        Record of a mass for `calibrate` in place of a drop.
-    taps : tuple of (float, float)
-        Taps on the plate for `calibrate --tap`: duration, s, and peak, N.
-    refusable : bool
-        Whether it may be refused, besides faults of `REFUSABLE`.
-    fault : callable or None
-        Damages the samples.
-    cause : str
-        Codes of warnings or words of refusals, one of which names the fault.
-    """
-
-    group: str
+    group: str  # part of the campaign
     name: str
-    told: bool = True
+    told: bool = True  # whether everything is stated
     chain: Chain = field(default_factory=Chain)
     scene: Scene = field(default_factory=Scene)
-    kind: str = ""
-    ball: Mapping[str, float] = field(default_factory=dict)
-    config: Mapping[str, Any] = field(default_factory=dict)
+    kind: str = ""  # of the pulse; empty: each in turn
+    ball: Mapping[str, float] = field(default_factory=dict)  # attributes that are not random
+    config: Mapping[str, Any] = field(default_factory=dict)  # keys besides those of any recording
+    # Standard uncertainties that are stated, and from which errors are drawn: calibration
+    # (relative), mass, kg, height, m, f0 and cutoff of the filter (relative).
     uncertainties: Mapping[str, float] = field(default_factory=dict)
-    cells: Cells | None = None
-    plate_told: bool = True
+    cells: Cells | None = None  # load cells in channels of their own
+    plate_told: bool = True  # whether plate and filter are stated
     filter_told: bool = True
-    files: str = "one"
-    weight: Weight | None = None
-    taps: tuple[tuple[float, float], ...] = ()
-    refusable: bool = False
-    fault: Fault | None = None
-    cause: str = ""
+    files: str = "one"  # or "table", or a kind of copies
+    weight: Weight | None = None  # record of a mass for `calibrate` in place of a drop
+    taps: tuple[tuple[float, float], ...] = ()  # for `calibrate --tap`: duration, s, and peak, N
+    refusable: bool = False  # whether it may be refused, besides faults of `REFUSABLE`
+    fault: Fault | None = None  # damages the samples
+    cause: str = ""  # codes of warnings or words of refusals, one of which names the fault
 
     @property
     def drops(self) -> int:
@@ -220,121 +203,97 @@ def _samples(add: Callable[..., None]) -> None:
     for size, name, place in steps:
         add("offset step", f"{size:g} N {name}", told=False, scene=Scene(step=(size, *place)))
 
-    quiet = Chain(25_600.0, noises=((0.3, 0.0),), offset=0.0)
+    plain, quiet = Chain(25_600.0), Chain(25_600.0, noises=((0.3, 0.0),), offset=0.0)
     silent, held = "constant_background", "is held|constant_background"
     clipped = "drop_like_bounce|restitution_impossible|restitutions_differ"
     faults: dict[str, tuple[Fault, str, Chain]] = {
-        "packets of 2 ms exchanged": (_exchange, "jump", Chain(25_600.0)),
-        "3 ms held over the touch": (_hold, held, Chain(25_600.0)),
+        "packets of 2 ms exchanged": (_exchange, "jump", plain),
+        "3 ms held over the touch": (_hold, held, plain),
         "zero outside, offset 12 N": (_silence, silent, replace(quiet, offset=12.0)),
         "zero outside, offset 60 N": (_silence, silent, replace(quiet, offset=60.0)),
-        "gate of 40 N": (_gate, silent, quiet),
-        "needles of 60 N": (_add_needles, "spikes", Chain(25_600.0)),
-        "missing codes of 8 N": (_without_bit(3), held, quiet),
-        "missing codes of 32 N": (_without_bit(5), held, quiet),
-        "noise of 1 % of the force": (_multiply_noise(0.01), "", Chain(25_600.0)),
-        "noise of 5 % of the force": (_multiply_noise(0.05), "", Chain(25_600.0)),
-        "amplifier up to 900 N": (_saturate(900.0), clipped, Chain(25_600.0)),
-        "amplifier up to 500 N": (_saturate(500.0), clipped, Chain(25_600.0)),
-        "line over 3 ms": (_draw_line, "filled by a line|jump", Chain(25_600.0)),
+        "gate of 40 N": (lambda v, _: np.where(np.abs(v) < 40.0, 0.0, v), silent, quiet),
+        "needles of 60 N": (_add_needles, "spikes", plain),
+        "missing codes of 8 N": (lambda v, _: _codes(v) & ~8, held, quiet),
+        "missing codes of 32 N": (lambda v, _: _codes(v) & ~32, held, quiet),
+        "noise of 1 % of the force": (lambda v, at: v * (1 + 0.01 * at.noise(v)), "", plain),
+        "noise of 5 % of the force": (lambda v, at: v * (1 + 0.05 * at.noise(v)), "", plain),
+        "amplifier up to 900 N": (lambda v, _: 900.0 * np.tanh(v / 900.0), clipped, plain),
+        "amplifier up to 500 N": (lambda v, _: 500.0 * np.tanh(v / 500.0), clipped, plain),
+        "line over 3 ms": (_draw_line, "filled by a line|jump", plain),
     }
+    filtered: dict[str, tuple[Fault, str, Chain]] = {
+        "multiplexed cells": (_multiplex, "aliasing", plain),
+        "multiplexed cells, 5 kHz": (_multiplex, "aliasing", Chain(5e3)),
+        "2 kHz drawn up to 48 kHz": (_draw_up, "noise_ends", Chain(48e3)),
+        "mean over 1 ms": (
+            lambda v, _: np.convolve(v, np.full(25, 1 / 25), mode="same"), "noise_ends", plain
+        ),
+        "low-pass of 700 Hz": (
+            lambda v, at: scipy.signal.sosfiltfilt(
+                scipy.signal.butter(4, 700.0, fs=at.rate, output="sos"), v
+            ), "noise_ends", plain,
+        ),
+    }  # fmt: skip
     scene = Scene(before=0.3, after=0.2, bounces=1)
-    for name, (fault, cause, chain) in faults.items():
-        add("samples", name, told=False, chain=chain, scene=scene, fault=fault, cause=cause)
-    filtered: dict[str, tuple[Fault, str, float]] = {
-        "multiplexed cells": (_multiplex, "aliasing", 25_600.0),
-        "multiplexed cells, 5 kHz": (_multiplex, "aliasing", 5e3),
-        "2 kHz drawn up to 48 kHz": (_draw_up, "noise_ends", 48e3),
-        "mean over 1 ms": (_average, "noise_ends", 25_600.0),
-        "low-pass of 700 Hz": (_low_pass, "noise_ends", 25_600.0),
-    }
-    for name, (fault, cause, rate) in filtered.items():
-        add("samples", name, told=False, chain=Chain(rate), scene=scene, fault=fault, cause=cause,
-            filter_told=False)  # fmt: skip
+    for stated, some in ((True, faults), (False, filtered)):
+        for name, (fault, cause, chain) in some.items():
+            add("samples", name, told=False, chain=chain, scene=scene, fault=fault, cause=cause,
+                filter_told=stated)  # fmt: skip
 
 
-def _exchange(values: Array, rate: float, first: int, stop: int, rng: np.random.Generator) -> Array:
+def _codes(values: Array) -> NDArray[np.int64]:
+    """Return whole newtons."""
+    return np.rint(values).astype(np.int64)
+
+
+def _exchange(values: Array, at: Contact) -> Array:
     """Exchange two packets of 2 ms of the contact."""
-    size = int(2e-3 * rate)
-    start = int(rng.integers(first, stop - 2 * size))
+    size = int(2e-3 * at.rate)
+    start = int(at.rng.integers(at.first, at.stop - 2 * size))
     values[start : start + 2 * size] = np.roll(values[start : start + 2 * size], size)
     return values
 
 
-def _hold(values: Array, rate: float, first: int, _: int, rng: np.random.Generator) -> Array:
+def _hold(values: Array, at: Contact) -> Array:
     """Hold a sample for 3 ms around the touch."""
-    start = first - int(rng.uniform(0.1, 0.9) * 3e-3 * rate)
-    values[start : start + int(3e-3 * rate)] = values[start]
+    start = at.first - int(at.rng.uniform(0.1, 0.9) * 3e-3 * at.rate)
+    values[start : start + int(3e-3 * at.rate)] = values[start]
     return values
 
 
-def _draw_line(
-    values: Array, rate: float, first: int, stop: int, rng: np.random.Generator
-) -> Array:
+def _draw_line(values: Array, at: Contact) -> Array:
     """Draw a line over 3 ms of the contact."""
-    size = int(3e-3 * rate)
-    start = int(rng.integers(first - size // 2, stop - size // 2))
+    size = int(3e-3 * at.rate)
+    start = int(at.rng.integers(at.first - size // 2, at.stop - size // 2))
     values[start : start + size] = np.linspace(values[start], values[start + size], size)
     return values
 
 
-def _silence(values: Array, rate: float, first: int, stop: int, _: np.random.Generator) -> Array:
+def _silence(values: Array, at: Contact) -> Array:
     """Set zero outside the contact with its margins."""
-    values[: first - int(2e-3 * rate)] = 0.0
-    values[stop + int(3e-3 * rate) :] = 0.0
+    values[: at.first - int(2e-3 * at.rate)] = 0.0
+    values[at.stop + int(3e-3 * at.rate) :] = 0.0
     return values
 
 
-def _gate(values: Array, *_: object) -> Array:
-    """Set zero what is below 40 N."""
-    return np.where(np.abs(values) < 40.0, 0.0, values)
-
-
-def _add_needles(values: Array, rate: float, _: int, __: int, rng: np.random.Generator) -> Array:
+def _add_needles(values: Array, at: Contact) -> Array:
     """Add a sample of 60 N each 10 ms."""
-    period = int(0.01 * rate)
-    values[int(rng.integers(period)) :: period] += 60.0
+    period = int(0.01 * at.rate)
+    values[int(at.rng.integers(period)) :: period] += 60.0
     return values
 
 
-def _without_bit(bit: int) -> Fault:
-    """Round to 1 N without a bit."""
-    return lambda values, *_: (np.rint(values).astype(int) & ~(1 << bit)).astype(float)
-
-
-def _multiply_noise(share: float) -> Fault:
-    """Add noise in proportion to the force."""
-    return lambda values, *more: values * (1 + share * more[-1].normal(size=len(values)))
-
-
-def _multiplex(values: Array, _: float, __: int, ___: int, rng: np.random.Generator) -> Array:
+def _multiplex(values: Array, at: Contact) -> Array:
     """Take each sample from the next of four cells."""
-    shares = 1 + rng.uniform(-0.3, 0.3, 4)
+    shares = 1 + at.rng.uniform(-0.3, 0.3, 4)
     return values * np.resize(4 * shares / shares.sum(), len(values))
 
 
-def _draw_up(values: Array, rate: float, _: int, __: int, rng: np.random.Generator) -> Array:
+def _draw_up(values: Array, at: Contact) -> Array:
     """Take samples at 2 kHz and lines between them."""
-    time = np.arange(len(values)) / rate
-    coarse = np.arange(rng.uniform(0, 5e-4), time[-1], 5e-4)
+    time = np.arange(len(values)) / at.rate
+    coarse = np.arange(at.rng.uniform(0, 5e-4), time[-1], 5e-4)
     return np.interp(time, coarse, np.interp(coarse, time, values))
-
-
-def _average(values: Array, rate: float, *_: object) -> Array:
-    """Average the samples with the noise over 1 ms."""
-    width = int(1e-3 * rate)
-    return np.convolve(values, np.full(width, 1 / width), mode="same")
-
-
-def _low_pass(values: Array, rate: float, *_: object) -> Array:
-    """Low-pass the samples with the noise."""
-    sections = scipy.signal.butter(4, 700.0, fs=rate, output="sos")
-    return np.asarray(scipy.signal.sosfiltfilt(sections, values))
-
-
-def _saturate(limit: float) -> Fault:
-    """Let the amplifier saturate softly."""
-    return lambda values, *_: limit * np.tanh(values / limit)
 
 
 def _scenes(add: Callable[..., None]) -> None:

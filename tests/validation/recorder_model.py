@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import math
 import sys
-from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.fft
@@ -49,15 +49,8 @@ COLOURS = ("white", "pink", "brown")
 
 # --- pulses -----------------------------------------------------------------------------------
 
-
-class Term(Protocol):
-    """Term of a pulse: force over time, and its transform."""
-
-    def force(self, time: Array) -> Array:
-        """Return the force at times from first touch, s, to the end."""
-
-    def transform(self, frequency: Array) -> Complex:
-        """Return the integral of force times exp(-2 pi i f t), in closed form."""
+# Terms of a pulse: the force at times, s, from first touch to the end, and the integral of force
+# times exp(-2 pi i f t), in closed form.
 
 
 @dataclass(frozen=True)
@@ -130,6 +123,9 @@ class Cosine:
         return np.asarray((up + down) / 2 * np.exp(-2j * np.pi * frequency * self.middle))
 
 
+Term = SinePower | Skewed | Cosine
+
+
 @lru_cache
 def gauss(count: int) -> tuple[Array, Array]:
     """Return nodes and weights of Gauss and Legendre on 0 to 1."""
@@ -158,9 +154,7 @@ class Pulse:
 
     def scaled(self, factor: float, stretch: float = 1.0) -> Pulse:
         """Return the pulse times a factor, and stretched in time."""
-        longer = tuple(
-            (factor * amplitude, _stretched(term, stretch)) for amplitude, term in self.terms
-        )
+        longer = tuple((factor * size, _stretched(term, stretch)) for size, term in self.terms)
         return Pulse(self.duration * stretch, longer)
 
     def transform(self, frequency: Array) -> Complex:
@@ -220,11 +214,9 @@ class Pulse:
 
 
 def _stretched(term: Term, factor: float) -> Term:
-    if isinstance(term, Cosine):
-        return Cosine(
-            term.middle * factor, term.width * factor, term.frequency / factor, term.phase
-        )
-    return replace(term, duration=term.duration * factor)  # type: ignore[type-var]
+    if not isinstance(term, Cosine):
+        return replace(term, duration=term.duration * factor)
+    return Cosine(term.middle * factor, term.width * factor, term.frequency / factor, term.phase)
 
 
 def half_cosine(duration: float, peak: float) -> Pulse:
@@ -336,13 +328,9 @@ def drop_pulse(kind: str, ball: Ball, rng: np.random.Generator) -> tuple[Pulse, 
     momentum = ball.mass * ball.velocity * (1 + ball.restitution)
     pulse = random_pulse(kind, momentum, rng)
     pulse = pulse.scaled(1 + ball.mass * GRAVITY * pulse.duration / momentum)
-    return pulse, truth_of(pulse, ball)
-
-
-def truth_of(pulse: Pulse, ball: Ball) -> Truth:
-    """Return the true values of a drop."""
     begin, end = pulse.contact()
-    return Truth(pulse.levels(), end - begin, ball.restitution, pulse.peak(), pulse.impulse)
+    truth = Truth(pulse.levels(), end - begin, ball.restitution, pulse.peak(), pulse.impulse)
+    return pulse, truth
 
 
 def bounces(pulse: Pulse, ball: Ball, count: int) -> list[tuple[float, Pulse]]:
@@ -384,17 +372,11 @@ def plate_response(modes: tuple[Mode, ...], frequency: Array) -> Complex:
     return response
 
 
-@lru_cache
-def bessel_polynomial(order: int) -> tuple[Array, float]:
-    """Return the reverse Bessel polynomial, highest power first, and its radian cutoff at 3 dB."""
-    f = math.factorial
-    rising = [f(2 * order - k) / (2 ** (order - k) * f(k) * f(order - k)) for k in range(order + 1)]
-    polynomial = np.array(rising[::-1])
-
-    def attenuation(omega: float) -> float:
-        return float(abs(np.polyval(polynomial, 1j * omega)) / polynomial[-1]) - math.sqrt(2)
-
-    return polynomial, float(scipy.optimize.brentq(attenuation, 0.1, 10.0))
+DESIGNS = {
+    "bessel": partial(scipy.signal.bessel, norm="mag"),
+    "butterworth": scipy.signal.butter,
+    "elliptic": lambda order, *more, **how: scipy.signal.ellip(order, 0.1, 80, *more, **how),
+}
 
 
 @dataclass(frozen=True)
@@ -412,70 +394,37 @@ class Filter:
 
     def response(self, frequency: Array) -> Complex:
         """Return the response at frequencies, Hz."""
-        s = 1j * frequency / self.cutoff
-        if self.kind == "bessel":
-            polynomial, cutoff = bessel_polynomial(self.order)
-            return np.asarray(polynomial[-1] / np.polyval(polynomial, s * cutoff))
-        if self.kind == "butterworth":
-            angles = np.pi * (2 * np.arange(self.order) + self.order + 1) / (2 * self.order)
-            return np.asarray(1 / np.prod(s[:, None] - np.exp(1j * angles), axis=1))
-        if self.kind == "elliptic":
-            poles = scipy.signal.ellip(self.order, 0.1, 80, 1.0, analog=True, output="zpk")
-            static, response = (
-                scipy.signal.freqs_zpk(*poles, w)[1] for w in (np.zeros(1), np.abs(s))
-            )
-            return np.asarray(response / static)
-        # Symmetric, so that its delay is taken out: a raised-cosine transition, 10 % wide.
-        x = np.clip((np.abs(s) - 0.907) / 0.186, 0, 1)
-        return np.asarray(0.5 + 0.5 * np.cos(np.pi * x), dtype=complex)
+        relative = frequency / self.cutoff
+        if self.kind == "fir":
+            # Symmetric, so that its delay is taken out: a raised-cosine transition, 10 % wide.
+            x = np.clip((np.abs(relative) - 0.907) / 0.186, 0, 1)
+            return np.asarray(0.5 + 0.5 * np.cos(np.pi * x), dtype=complex)
+        poles = DESIGNS[self.kind](self.order, 1.0, analog=True, output="zpk")
+        static, response = (scipy.signal.freqs_zpk(*poles, w)[1] for w in (np.zeros(1), relative))
+        return np.asarray(response / static)
 
 
 @dataclass(frozen=True)
 class Chain:
-    """From plate to file.
+    """From plate to file."""
 
-    Attributes
-    ----------
-    rate : float
-        Samples per second, Hz.
-    modes, filter : tuple of Mode, Filter or None
-        Plate and anti-aliasing filter; None: a FIR filter at half the rate.
-    time_constant, second_time_constant : float
-        Of the amplifier, s, and of a further one.
-    bits, full_scale : int, float
-        Converter, and its range, N.
-    noises : tuple of (float, float)
-        Deviation, N, and slope of the spectrum: 0 white, 1 pink, 2 brown.
-    offset, drift : float
-        N and N/s.
-    hum : tuple of float
-        Frequency, Hz, and amplitude of the fundamental, N.
-    tremor : float
-        Deviation of the vibration of the building at 5 to 12 Hz, N.
-    spikes, spike_size : float
-        Spikes of one sample: mean number per second, and size, N.
-    gain : float
-        Indicated over true force.
-    negative : bool
-        Whether compression is negative in the file.
-    """
-
-    rate: float = 51_200.0
-    modes: tuple[Mode, ...] = ()
-    filter: Filter | None = None
-    time_constant: float = math.inf
-    second_time_constant: float = math.inf
-    bits: int = 24
-    full_scale: float = 10_000.0
+    rate: float = 51_200.0  # Hz
+    modes: tuple[Mode, ...] = ()  # of the plate
+    filter: Filter | None = None  # none: a FIR filter at half the rate
+    time_constant: float = math.inf  # of the amplifier, s
+    second_time_constant: float = math.inf  # s
+    bits: int = 24  # of the converter
+    full_scale: float = 10_000.0  # N
+    # Deviation, N, and slope of the spectrum: 0 white, 1 pink, 2 brown.
     noises: tuple[tuple[float, float], ...] = ((0.5, 0.0),)
-    offset: float = 20.0
-    drift: float = 0.0
-    hum: tuple[float, float] = (50.0, 0.0)
-    tremor: float = 0.0
-    spikes: float = 0.0
-    spike_size: float = 0.0
-    gain: float = 1.0
-    negative: bool = False
+    offset: float = 20.0  # N
+    drift: float = 0.0  # N/s
+    hum: tuple[float, float] = (50.0, 0.0)  # Hz, and amplitude of the fundamental, N
+    tremor: float = 0.0  # deviation of the vibration of the building at 5 to 12 Hz, N
+    spikes: float = 0.0  # of one sample: mean number per second
+    spike_size: float = 0.0  # N
+    gain: float = 1.0  # indicated over true force
+    negative: bool = False  # whether compression is negative in the file
 
     def response(self, frequency: Array) -> Complex:
         """Return the response of plate and filter at frequencies, Hz."""
@@ -508,32 +457,18 @@ class Chain:
 
 @dataclass(frozen=True)
 class Scene:
-    """What the plate and the recorder go through.
+    """What the plate and the recorder go through; times, s, count from first touch."""
 
-    Attributes
-    ----------
-    before : float
-        Length of the record before first touch, s.
-    after : float
-        Length after the last touch of the ball, s.
-    bounces : int
-        Number of bounces.
-    taps : tuple of (float, float, float)
-        Time from first touch, s, duration, s, and peak, N, of taps on the plate.
-    loads : tuple of (float, float, float)
-        Time, s, from first touch, duration of its change, s, and change, N, of a load.
-    treads : tuple of (float, float, float)
-        Time, s, duration, s, and force, N, of steps on the plate: two humps each.
-    step : tuple of (float, float, float)
-        Jump of the offset, N, at a part of the contact, over a part of it.
-    """
-
-    before: float = 0.3
-    after: float = 0.3
+    before: float = 0.3  # length of the record before first touch, s
+    after: float = 0.3  # length after the last touch of the ball, s
     bounces: int = 1
+    # Taps on the plate: time, s, duration, s, and peak, N.
     taps: tuple[tuple[float, float, float], ...] = ()
+    # Loads: time, s, duration of the change, s, and change, N.
     loads: tuple[tuple[float, float, float], ...] = ()
+    # Steps on the plate, of two humps each: time, s, duration, s, and force, N.
     treads: tuple[tuple[float, float, float], ...] = ()
+    # Jump of the offset, N, at a part of the contact, over a part of it.
     step: tuple[float, float, float] = (0.0, 0.5, 0.0)
 
 
@@ -619,27 +554,22 @@ def convert(values: Array, chain: Chain) -> NDArray[np.int64]:
     return np.clip(codes, -top, top - 1).astype(np.int64)
 
 
-def write_sound(path: Path, codes: NDArray[np.int64], chain: Chain) -> None:
+def write_sound(path: Path, codes: NDArray[np.int64], chain: Chain) -> Path:
     """Write codes, shape (n_sample,) or (n_sample, n_channel), as a WAV file of full scale."""
     bits = 16 if chain.bits <= 16 else 24
     kind, width = (np.int16, 16) if bits == 16 else (np.int32, 32)
     shifted = (codes << (width - chain.bits)).astype(kind)
     soundfile.write(path, shifted, round(chain.rate), f"PCM_{bits}")
+    return path
 
 
-def write_table(path: Path, columns: dict[str, Array], rate: float) -> None:
+def write_table(path: Path, columns: dict[str, Array], rate: float) -> Path:
     """Write columns with their titles as a table with times."""
     count = len(next(iter(columns.values())))
     table = np.column_stack([np.arange(count) / rate, *columns.values()])
-    header = ",".join(["Time [s]", *columns])
-    np.savetxt(
-        path,
-        table,
-        fmt=["%.9f", *["%.9g"] * len(columns)],
-        delimiter=",",
-        header=header,
-        comments="",
-    )
+    formats = ["%.9f", *["%.9g"] * len(columns)]
+    np.savetxt(path, table, formats, ",", header=",".join(["Time [s]", *columns]), comments="")
+    return path
 
 
 # --- load cells -------------------------------------------------------------------------------
@@ -678,7 +608,7 @@ class Weight:
     off: float = 0.0
     end: float = 8.0
     rise: float = 0.15
-    knock: float = field(default=20.0)
+    knock: float = 20.0
 
 
 def weight_record(weight: Weight, chain: Chain, rng: np.random.Generator) -> Array:
@@ -700,9 +630,7 @@ def tap_record(
     taps: tuple[tuple[float, float], ...], chain: Chain, rng: np.random.Generator
 ) -> Array:
     """Return the record of taps with a hammer, each a duration, s, and a peak, N."""
-    events = [
-        (0.5 * (k + 1) + rng.uniform() / chain.rate, half_cosine(*tap))
-        for k, tap in enumerate(taps)
-    ]
+    starts = (0.5 * k + rng.uniform() / chain.rate for k in range(1, len(taps) + 1))
+    events = [(start, half_cosine(*tap)) for start, tap in zip(starts, taps, strict=True)]
     force = chain.pass_events(events, int(0.5 * (len(taps) + 1) * chain.rate))
     return electric(force, chain, Scene(), 0.0, rng)
