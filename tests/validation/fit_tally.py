@@ -33,6 +33,11 @@ def quiet_fit(*arguments: Any, **options: Any) -> thud.Fit:  # noqa: ANN401 - of
         return thud.fit(*arguments, confidence=CONFIDENCE, **options)
 
 
+def random_of(name: str, seed: int) -> np.random.Generator:
+    """Return random numbers of a record, of its own for each name."""
+    return np.random.default_rng([seed, *name.encode()])
+
+
 class Tally(NamedTuple):
     """Of fits: by fit, whether it warns; by fit and parameter, all relative to the truth.
 
@@ -76,8 +81,12 @@ def tally(fits: Iterable[thud.Fit], truth: Mapping[str, float]) -> Tally:
     return Tally(*map(np.array, (warned, covered, errors, widths)))
 
 
-def print_tallies(names: Iterable[str], fits: Fits, truth: Mapping[str, float], count: int) -> None:
-    """Print a row for each name: with the unknowns of a fit, and where it trusts its case."""
+def print_tallies(names: Iterable[str], fits: Fits, truth: Mapping[str, float], usual: int) -> None:
+    """Print a row for each name: with the unknowns of a fit, and where it trusts its case.
+
+    The number of fits of each is the first argument of the command, or the usual one.
+    """
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else usual
     columns = ["", "unknowns", "warned", "missed", "in silence"]
     columns += [f"{what} of {key}, %" for key in truth
                 for what in ("covered", "error", "standard error")]  # fmt: skip
