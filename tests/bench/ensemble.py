@@ -206,13 +206,8 @@ def stream(count: int, path: Path, chunk: int = 50_000) -> None:
                 "youngs_modulus": random.uniform(1.4e6, 1.8e6, n),
                 "wall_thickness": random.uniform(0.030, 0.034, n),
             }, threads=1)  # fmt: skip
-            rows = [
-                found.contact_time,
-                found.peak_elastic_force,
-                found.restitution,
-                *found.elastic_octave.T,
-            ]
-            np.column_stack(rows).tofile(file)
+            rows = found.contact_time, found.peak_elastic_force, found.restitution
+            np.column_stack([*rows, found.elastic_octave]).tofile(file)
     print(time.perf_counter() - start, peak_memory())
 
 
@@ -227,14 +222,10 @@ def peak_memory() -> float:
 
 def report(name: str, ours: float, competitor: str, theirs: float | None) -> None:
     """Print one comparison of rates."""
-    if theirs is None:
-        required = assess(name, competitor, rate=ours)
-        print(f"{name:36} {ours:9,.0f}/s   {competitor:38} not installed   {required}")
-        return
-    ratio = ours / theirs
-    required = assess(name, competitor, rate=ours, times=ratio)
-    print(f"{name:36} {ours:9,.0f}/s   {competitor:38} {theirs:9,.0f}/s"
-          f"   ratio {ratio:7.1f}   {required}")  # fmt: skip
+    ratio = {} if theirs is None else {"times": ours / theirs}
+    other = "not installed" if theirs is None else f"{theirs:9,.0f}/s   ratio {ours / theirs:7.1f}"
+    required = assess(name, competitor, rate=ours, **ratio)
+    print(f"{name:36} {ours:9,.0f}/s   {competitor:38} {other}   {required}")
 
 
 def bench_ensemble(scipy_drop: Callable[[], object]) -> None:
@@ -247,19 +238,13 @@ def bench_ensemble(scipy_drop: Callable[[], object]) -> None:
         return best(lambda: solve_shells(drops, threads=threads, levels=levels), 7, clock)
 
     bare, whole = run(levels=False), run()
-    marching, complete = SETS / bare, SETS / whole
     name = "ensemble, trajectories"
-    report(name, marching, "heyoka, batch mode", heyoka_rate())
-    report(name, marching, "JAX, RK4, float64", jax_rate())
-    report(name, marching, "SciPy DOP853", 1 / best(scipy_drop, 11))
-    report(
-        "ensemble, five levels and verdict",
-        complete,
-        "numba RK4, SciPy ZoomFFT levels",
-        numba_rate(),
-    )
-    levels = 2 * SETS / (whole - bare)
-    name = "levels alone (by difference)"
+    report(name, SETS / bare, "heyoka, batch mode", heyoka_rate())
+    report(name, SETS / bare, "JAX, RK4, float64", jax_rate())
+    report(name, SETS / bare, "SciPy DOP853", 1 / best(scipy_drop, 11))
+    name = "ensemble, five levels and verdict"
+    report(name, SETS / whole, "numba RK4, SciPy ZoomFFT levels", numba_rate())
+    name, levels = "levels alone (by difference)", 2 * SETS / (whole - bare)
     report(name, levels, "SciPy ZoomFFT, 64 lines per band", zoom_rate())
     one, two = (SETS / run(threads, clock=time.perf_counter) for threads in (1, 2))
     report("ensemble, two threads", two, "one thread", one)

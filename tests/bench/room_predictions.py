@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import os
-import time
 from dataclasses import replace
 from itertools import count
 from typing import TYPE_CHECKING
 
 import numpy as np
-from requirements import assess
 from scipy.sparse.linalg import eigsh
 
 import thud
@@ -34,12 +31,10 @@ FLOORS = {
 }
 # Elements along length and width, and number of modes, of the competitor.
 ELEMENTS, MODES = (20, 16), 40
-# Samples of the study.
-SAMPLES = 100
 
 
 def bench_rooms(row: Callable[..., None], medians: Callable[..., list[float]]) -> None:
-    """Print the rows on both predictions of floors, and the rate of a study of floors."""
+    """Print the rows on both predictions of floors."""
     if skfem is None:
         print("scikit-fem is not installed: skipped")
         return
@@ -64,7 +59,6 @@ def bench_rooms(row: Callable[..., None], medians: Callable[..., list[float]]) -
 
         seconds = medians(predict, lambda: plate_modes(plate), 5)
         row(f"drop and predictions, {name}", "scikit-fem, modes of a clamped plate", seconds)
-    _bench_study()
 
 
 def plate_modes(plate: thud.Plate) -> np.ndarray:
@@ -93,20 +87,3 @@ def plate_modes(plate: thud.Plate) -> np.ndarray:
     )
     frequencies: np.ndarray = np.sqrt(np.sort(values)) / (2 * np.pi)
     return frequencies
-
-
-def _bench_study() -> None:
-    """Print the rate of a study of floors on all processors, and what 1000 floors take."""
-    study = {
-        "case": {"floor": {"name": "plate"}, "room": {}},
-        "design": {"kind": "random", "size": SAMPLES, "seed": 1},
-        "parameters": {"plate.thickness": {"low": 0.14, "high": 0.3}},
-    }
-    thud.sweep({**study, "design": {"kind": "random", "size": 2, "seed": 1}})
-    start = time.perf_counter()
-    thud.sweep(study)
-    rate = SAMPLES / (time.perf_counter() - start)
-    print(
-        f"study of floors, {len(os.sched_getaffinity(0))} processors: {rate:.1f}/s, "
-        f"1000 floors in {1000 / rate:.0f} s   {assess('study of floors', rate=rate)}"
-    )

@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import io
-import platform
 import statistics
 import subprocess
 import sys
@@ -18,7 +17,7 @@ import sysconfig
 import tempfile
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import scipy
@@ -119,10 +118,7 @@ def row(name: str, competitor: str, seconds: list[float]) -> None:
 
 def processor() -> str:
     """Return the name of the processor."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:
-        return platform.processor()
+    lines = Path("/proc/cpuinfo").read_text(encoding="ascii").splitlines()
     return next((line.split(":")[1].strip() for line in lines if "model name" in line), "unknown")
 
 
@@ -155,22 +151,16 @@ def main() -> int:
     modal = medians(lambda: thud.solve(model="modal_ball"), scipy_drop, 21)
     row("thud.solve, modal ball", "SciPy DOP853, shell model", modal)
     transforms = zoom_transforms(len(contact))
-    exact = medians(
-        lambda: thud.force_exposure_levels(contact, RATE), lambda: numpy_levels(contact), 101
+    rows: tuple[tuple[Literal["exact", "fft"], str, Callable[[], object]], ...] = (
+        ("exact", "SciPy ZoomFFT, 64 lines per band", lambda: zoom_levels(contact, transforms)),
+        ("fft", "NumPy rfft, 1 s", lambda: numpy_levels(contact)),
     )
-    row("levels, exact, five octaves", "NumPy rfft, 1 s", exact)
-    zoom = medians(
-        lambda: thud.force_exposure_levels(contact, RATE),
-        lambda: zoom_levels(contact, transforms),
-        101,
-    )
-    row("levels, exact, five octaves", "SciPy ZoomFFT, 64 lines per band", zoom)
-    bins = medians(
-        lambda: thud.force_exposure_levels(contact, RATE, method="fft"),
-        lambda: numpy_levels(contact),
-        101,
-    )
-    row("levels, fft, five octaves", "NumPy rfft, 1 s", bins)
+    for method, competitor, theirs in rows:
+
+        def ours(method: Literal["exact", "fft"] = method) -> object:
+            return thud.force_exposure_levels(contact, RATE, method=method)
+
+        row(f"levels, {method}, five octaves", competitor, medians(ours, theirs, 101))
     print()
     bench_ensemble(scipy_drop)
     print()
