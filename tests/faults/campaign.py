@@ -26,6 +26,7 @@ import traceback
 import warnings
 from collections import Counter
 from contextlib import suppress
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -45,30 +46,20 @@ SANITIZED = "libasan" in os.environ.get("LD_PRELOAD", "")
 
 
 class Part(NamedTuple):
-    """A part of the campaign.
+    """A part of the campaign."""
 
-    Attributes
-    ----------
-    attempt : callable
-        Makes an attempt in the current directory; returns a word, such as "refused" or one of
-        `FAULTS`, and how to see it.
-    tries, small : int
-        Attempts of the campaign, and of the slow tests.
-    limit : int
-        Seconds that an attempt may take.
-    may_stop : bool
-        Whether an attempt that takes longer is interrupted, since it computes what takes long.
-    """
-
+    # Makes an attempt in the current directory; returns a word, such as "refused" or one of
+    # `FAULTS`, and how to see it.
     attempt: Callable[[random.Random], tuple[str, str]]
-    tries: int
-    small: int
-    limit: int = 60
-    may_stop: bool = False
+    tries: int  # attempts of the campaign
+    small: int  # of the slow tests
+    limit: int = 60  # seconds that an attempt may take
+    may_stop: bool = False  # whether one that takes longer is interrupted, since it computes
 
 
 def parts() -> dict[str, Part]:
     """Return the parts of the campaign by name."""
+    import cases
     import edges
     import namelists
     import readers
@@ -79,9 +70,9 @@ def parts() -> dict[str, Part]:
         "recordings": Part(readers.read_recordings, 4000, 500),
         "tables": Part(readers.read_tables, 800, 60, 20, may_stop=True),
         "studies": Part(readers.read_studies, 300, 60, 20, may_stop=True),
-        "lumped": Part(edges.attempt_lumped, 1500, 60, 60, may_stop=True),
-        "modal": Part(edges.attempt_modal, 100, 8, 20, may_stop=True),
-        "elements": Part(edges.attempt_elements, 40, 4, 15, may_stop=True),
+        "lumped": Part(partial(edges.attempt, cases.LUMPED), 1500, 60, 60, may_stop=True),
+        "modal": Part(partial(edges.attempt, {"modal_ball": 1}), 100, 8, 20, may_stop=True),
+        "elements": Part(partial(edges.attempt, {"finite_element": 1}), 40, 4, 15, may_stop=True),
         "explorer": Part(servers.attempt, 60, 8),
     }
 

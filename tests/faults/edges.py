@@ -7,7 +7,6 @@ and with other units.
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import fields, replace
 from typing import TYPE_CHECKING
 
@@ -26,8 +25,6 @@ if TYPE_CHECKING:
 
 # What balances may miss: of lumped sources, and of finite elements.
 BALANCE, FE_BALANCE = 1e-6, 0.005
-
-
 # Changes of contact time and restitution by steps half as long, measured up to 2e-6.
 STEP_CHANGE = 1e-5
 # Powers of mass, length and time in the units of keys.
@@ -38,34 +35,18 @@ POWERS = {"": (0, 0, 0), "m": (0, 1, 0), "kg": (1, 0, 0), "s": (0, 0, 1), "Hz": 
 SCALED_FLOORS = (None, "infinite_plate", "oscillator", "measured_mobility")
 
 
-def attempt_lumped(chance: random.Random) -> tuple[str, str]:
-    """Try a drop of a lumped model."""
-    return _attempt(chance.choices(list(LUMPED), list(LUMPED.values()))[0], chance)
-
-
-def attempt_modal(chance: random.Random) -> tuple[str, str]:
-    """Try a drop of the modal ball."""
-    return _attempt("modal_ball", chance)
-
-
-def attempt_elements(chance: random.Random) -> tuple[str, str]:
-    """Try a drop of finite elements."""
-    return _attempt("finite_element", chance)
-
-
-def _attempt(model: str, chance: random.Random) -> tuple[str, str]:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        try:
-            case = draw_case(model, chance)
-            impact = thud.solve(case)
-            wrong = get_fault(impact)
-            if wrong == "rigid: restitution" and is_of_step(impact):
-                wrong = ""
-            if not wrong and chance.random() < 0.1:
-                wrong = chance.choice([_finer_steps, _other_units])(impact, chance)
-        except thud.ThudError as error:
-            return ("NaN", str(error)) if "NaN" in str(error) else ("refused", "")
+def attempt(models: dict[str, int], chance: random.Random) -> tuple[str, str]:
+    """Try a drop of a model, by their weights."""
+    try:
+        case = draw_case(chance.choices(list(models), list(models.values()))[0], chance)
+        impact = thud.solve(case)
+        wrong = get_fault(impact)
+        if wrong == "rigid: restitution" and is_of_step(impact):
+            wrong = ""
+        if not wrong and chance.random() < 0.1:
+            wrong = chance.choice([_finer_steps, _other_units])(impact, chance)
+    except thud.ThudError as error:
+        return ("NaN", str(error)) if "NaN" in str(error) else ("refused", "")
     if wrong:
         return "wrong", f"{wrong}; {case_text(case).decode().split()} {impact.notes}"
     return ("warned" if impact.notes else "computed"), ""
@@ -117,9 +98,8 @@ def _laws(impact: thud.Impact) -> dict[str, bool]:
         power = force * impact.floor_velocity
         # Contact takes or gives some energy within the steps of the modal ball.
         missing = balance * energy + abs(impact.model_quantities.get("contact_loss", 0.0))
-        spread = step * (
-            np.abs(np.diff(power, prepend=0, append=0)).sum() + 2 * np.abs(power).max()
-        )
+        changes = np.abs(np.diff(power, prepend=0, append=0)).sum()
+        spread = step * (changes + 2 * np.abs(power).max())
         laws |= {
             "the floor takes energy": -missing <= impact.floor_work
             <= energy + missing or gravity,
@@ -134,12 +114,17 @@ def _energy(levels: np.ndarray) -> float:
     return float(10 * np.log10(np.sum(10 ** (levels / 10))))
 
 
+def _finer(impact: thud.Impact, factor: int) -> thud.Impact:
+    """Return the same drop in steps as many times shorter."""
+    sampling = impact.case.sampling
+    finer = replace(sampling, substeps=factor * sampling.substeps)
+    return thud.solve(replace(impact.case, sampling=finer))
+
+
 def _finer_steps(impact: thud.Impact, _: random.Random) -> str:
-    case = impact.case
-    if isinstance(case.model, thud.FiniteElement | thud.ModalBall):
+    if isinstance(impact.case.model, thud.FiniteElement | thud.ModalBall):
         return ""
-    finer = thud.solve(_sampled(case, substeps=2 * case.sampling.substeps))
-    for one, other in _pairs(impact, finer):
+    for one, other in _pairs(impact, _finer(impact, 2)):
         changes = (one.contact_time / other.contact_time - 1, one.restitution - other.restitution)
         if max(map(abs, changes)) > STEP_CHANGE:
             return f"half the step changes contact time and restitution by {changes}"
@@ -149,20 +134,15 @@ def _finer_steps(impact: thud.Impact, _: random.Random) -> str:
 def is_of_step(impact: thud.Impact) -> bool:
     """Return whether a restitution above 1 raises a warning, and an error of the step."""
     excess = impact.restitution - 1
-    if not any(math.isclose(note.value, excess) for note in impact.notes):
-        return False
-    finer = thud.solve(_sampled(impact.case, substeps=4 * impact.case.sampling.substeps))
-    return abs(finer.restitution - 1) < excess / 4
+    is_noted = any(math.isclose(note.value, excess) for note in impact.notes)
+    return is_noted and abs(_finer(impact, 4).restitution - 1) < excess / 4
 
 
 def _other_units(impact: thud.Impact, chance: random.Random) -> str:
     """Compare with the same drop in other units of mass, length and time (Buckingham)."""
     case = impact.case
-    scales = [
-        4.0 ** chance.randint(-3, 3),
-        4.0 ** chance.randint(-3, 3),
-        chance.choice([0.5, 1, 2]),
-    ]
+    mass, length = (4.0 ** chance.randint(-3, 3) for _ in range(2))
+    scales = [mass, length, chance.choice([0.5, 1, 2])]
     # The resolution of others is for bands in Hz.
     if case.model.name not in LUMPED or (case.floor and case.floor.name) not in SCALED_FLOORS:
         return ""
@@ -181,20 +161,16 @@ def _other_units(impact: thud.Impact, chance: random.Random) -> str:
 def _scaled(case: thud.Case, scales: list[float]) -> thud.Case:
     groups = {}
     for name in ("ball", "drop", "sampling", "model", "floor"):
-        group = getattr(case, name)
-        if group is None:
+        if (group := getattr(case, name)) is None:
             continue
         owner = group.name if name in ("model", "floor") else ""
-        keys = {
-            key.name: key for key in KEYS if key.owner == owner and (owner or key.group == name)
-        }
         values = {one.name: getattr(group, one.name) for one in fields(group)}
-        for word, value in values.items():
-            unit = _unit(scales, _powers(group, keys[word]))
+        for key in (key for key in KEYS if key.owner == owner and (owner or key.group == name)):
+            value, unit = values.get(key.name), _unit(scales, _powers(group, key))
             if isinstance(value, tuple | list):
-                values[word] = [unit * one for one in value]
+                values[key.name] = [unit * one for one in value]
             elif isinstance(value, float):
-                values[word] = unit * value
+                values[key.name] = unit * value
         groups[name] = type(group)(**values)
     return replace(case, **groups)
 
@@ -210,10 +186,6 @@ def _powers(group: Group, key: Key) -> tuple[float, float, float]:
 
 def _unit(scales: list[float], powers: tuple[float, float, float]) -> float:
     return math.prod(scale**power for scale, power in zip(scales, powers, strict=True))
-
-
-def _sampled(case: thud.Case, **values: float) -> thud.Case:
-    return replace(case, sampling=replace(case.sampling, **values))
 
 
 def _pairs(one: thud.Impact, other: thud.Impact) -> Iterable[tuple[thud.Impact, thud.Impact]]:

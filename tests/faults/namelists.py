@@ -108,10 +108,10 @@ def _tried(path: Path, effective: bytes, chance: random.Random) -> tuple[str, st
     is_long = math.prod(map(float, sampling.values())) > MAX_SAMPLES
     if is_long or chance.random() > (SLOW if is_slow else FRACTION):
         return "accepted", ""
-    return _computed(path, effective, has_model=b"&model" in effective, again=chance.random() < 0.2)
+    return _computed(path, effective, chance)
 
 
-def _computed(path: Path, effective: bytes, *, has_model: bool, again: bool) -> tuple[str, str]:
+def _computed(path: Path, effective: bytes, chance: random.Random) -> tuple[str, str]:
     """Run a case as the executable does, and look at all that it leaves."""
     found, files = _run(path)
     _fill_free_limits(found.get("levels", {}))
@@ -122,21 +122,19 @@ def _computed(path: Path, effective: bytes, *, has_model: bool, again: bool) -> 
             return "NaN", f"{name}: {content[max(0, bad.start() - 80) : bad.end() + 20]!r}"
     if files["effective.nml"] != effective:
         return "mixed", "effective.nml is not the effective input"
-    return _read_back(found, files, has_model=has_model) if again else ("computed", "")
+    return _read_back(found, files) if chance.random() < 0.2 else ("computed", "")
 
 
-def _read_back(
-    found: dict[str, Any], files: dict[str, bytes], *, has_model: bool
-) -> tuple[str, str]:
+def _read_back(found: dict[str, Any], files: dict[str, bytes]) -> tuple[str, str]:
     """Read the results of a case, and compute its effective input again."""
-    if has_model:
+    path = Path("effective.nml")
+    if b"&model" in files[path.name]:
         impact = thud.read_results(Path("o"))
         if not np.array_equal(impact.floor_force, found["force"]["floor_force_N"]):
             return "mixed", "results are not read as they were computed"
         rows = [*impact.rows(), *(impact.on_floor.rows() if impact.on_floor else ())]
         if wrong := [row for row in rows if NO_NUMBER.search(" ".join(map(str, row)).encode())]:
             return "NaN", f"rows: {wrong}"
-    path = Path("effective.nml")
     path.write_bytes(files[path.name])
     others = _run(path)[1]
     differing = [name for name in files | others if files.get(name) != others.get(name)]
