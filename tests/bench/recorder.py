@@ -42,6 +42,7 @@ from recorder_model import (
     GRAVITY,
     KINDS,
     Ball,
+    Cells,
     Chain,
     Truth,
     convert,
@@ -184,15 +185,15 @@ def record(
     def take(one: Pulse, name: str) -> Path:
         force = plate_force(one, ball, chain, condition.scene, rng)
         if condition.cells:
-            return _write_cells(condition, force, folder / name, chain, rng)
+            return _write_cells(condition.cells, force, folder / name, chain, rng)
         values = electric(force, chain, condition.scene, one.duration, rng)
         if condition.fault:
             before = condition.scene.before
             first, stop = (int(end * chain.rate) + 1 for end in (before, before + one.duration))
             values = condition.fault(values, Contact(chain.rate, first, stop, rng))
-        return _write(values, folder / name, chain, config, condition.files)
+        return _write(values, folder / name, chain)
 
-    if condition.cells or condition.files in {"one", "table"}:
+    if condition.cells or condition.files == "one":
         paths = [take(pulse, "drop")]
     elif condition.files.endswith("drops"):
         # Drops of one ball differ in the contact time, and with it in the levels.
@@ -212,7 +213,7 @@ def configuration(condition: Condition, ball: Ball, errors: Mapping[str, float])
         "height": ball.height + errors.get("height", 0.0),
         "mass_uncertainty": uncertainties.get("mass", 0.0),
         "height_uncertainty": uncertainties.get("height", 0.0),
-        "calibration": f"{chain.full_scale!r} N/FS" if condition.files != "newtons" else None,
+        "calibration": f"{chain.full_scale!r} N/FS",
         "calibration_uncertainty": uncertainties.get("calibration", 0.0),
     }  # fmt: skip
     config |= condition.config
@@ -243,29 +244,19 @@ def _varied(pulse: Pulse, rng: np.random.Generator) -> Pulse:
     return pulse.scaled(1 / stretch, stretch)
 
 
-def _write(values: Array, stem: Path, chain: Chain, config: dict[str, Any], files: str) -> Path:
-    whole = convert(values, chain)
-    if files == "table":
-        config["calibration"] = f"{chain.full_scale / 10!r} N/V"
-        columns = {"Plate [V]": whole * (10.0 / 2 ** (chain.bits - 1))}
-        return write_table(stem.with_suffix(".csv"), columns, chain.rate)
-    return write_sound(stem.with_suffix(".wav"), whole, chain)
+def _write(values: Array, stem: Path, chain: Chain) -> Path:
+    return write_sound(stem.with_suffix(".wav"), convert(values, chain), chain)
 
 
 def _write_cells(
-    condition: Condition, force: Array, stem: Path, chain: Chain, rng: np.random.Generator
+    cells: Cells, force: Array, stem: Path, chain: Chain, rng: np.random.Generator
 ) -> Path:
-    """Write the load cells as a table in V, a table in N, or a WAV file."""
-    cells = condition.cells
-    assert cells is not None
-    volts = cells.volts(force, chain, rng)
-    newtons = volts / np.array(cells.sensitivities)[:, None]
-    if condition.files == "sound":
-        return write_sound(stem.with_suffix(".wav"), convert(newtons, chain).T, chain)
-    is_force = condition.files == "newtons"
-    unit, values, step = ("N", newtons, 0.001) if is_force else ("V", volts, 10 / 2**23)
-    columns = {f"F{k} [{unit}]": np.rint(one / step) * step for k, one in enumerate(values, 1)}
-    return write_table(stem.with_suffix(".csv"), columns, chain.rate)
+    """Write the load cells as a table in V."""
+    step = 10 / 2**23
+    volts = np.rint(cells.volts(force, chain, rng) / step) * step
+    return write_table(
+        stem.with_suffix(".csv"), {f"F{k} [V]": one for k, one in enumerate(volts, 1)}, chain.rate
+    )
 
 
 def _copies(path: Path, files: str, chain: Chain) -> list[Path]:
@@ -327,7 +318,7 @@ def _calibrated(
 ) -> tuple[dict[str, Value], tuple[Note, ...]]:
     weight, chain = condition.weight, condition.chain
     assert weight is not None
-    path = _write(weight_record(weight, chain, rng), folder / "weight", chain, {}, "one")
+    path = _write(weight_record(weight, chain, rng), folder / "weight", chain)
     found = calibrate(path, force=weight.mass * GRAVITY, uncertainty=1e-4, unit="FS")
     error = float(found.chain.split()[0]) / chain.full_scale - 1
     concerned = any(CALIBRATION in concern(note) for note in found.notes if note.is_warning)
@@ -339,7 +330,7 @@ def _tapped(
 ) -> tuple[dict[str, Value], tuple[Note, ...]]:
     chain, mode = condition.chain, condition.chain.modes[0]
     record = tap_record(condition.taps, chain, rng)
-    found = calibrate_tap(_write(record, folder / "tap", chain, {}, "one"))
+    found = calibrate_tap(_write(record, folder / "tap", chain))
     # As an error of the recorder's clock.
     clock = 1 + CLOCK * rng.normal()
     return {

@@ -62,7 +62,7 @@ class Condition:
     cells: Cells | None = None  # load cells in channels of their own
     plate_told: bool = True  # whether plate and filter are stated
     filter_told: bool = True
-    files: str = "one"  # or "table", or a kind of copies
+    files: str = "one"  # or a kind of copies
     weight: Weight | None = None  # record of a mass for `calibrate` in place of a drop
     taps: tuple[tuple[float, float], ...] = ()  # for `calibrate --tap`: duration, s, and peak, N
     refusable: bool = False  # whether it may be refused, besides faults of `REFUSABLE`
@@ -187,9 +187,6 @@ def _filters(add: Callable[..., None]) -> None:
     for bits in (8, 12):
         chain = Chain(bits=bits, full_scale=4e3, noises=((0.01, 0.0),), offset=0.0)
         add("quantization", f"{bits} bit, no noise, no offset", chain=chain)
-    for bits, full_scale in ((8, 4e3), (12, 20e3)):
-        chain = replace(few, bits=bits, full_scale=full_scale)
-        add("quantization", f"{bits} bit as a table, V", chain=chain, files="table")
 
 
 def _samples(add: Callable[..., None]) -> None:
@@ -300,12 +297,9 @@ def _scenes(add: Callable[..., None]) -> None:
     """Add steps and taps, short backgrounds, and bounces."""
     near = tuple((begin, 0.015, 25.0) for begin in (-2.6, -2.0, -1.4))
     walk = ((-3.5, 0.65, 750.0), (-2.9, 0.65, 760.0))
-    back = ((1.8, 0.7, 780.0), (2.4, 0.7, 780.0))
     stood, left, leaves = (-10.0, 1.0, 750.0), (-1.5, 0.4, -750.0), (2.0, 0.4, -750.0)
     laid = ((-3.5, 0.08, 24.5), (-2.9, 0.1, -24.5), (-2.2, 0.05, 40.0), (-1.9, 0.06, -40.0))
     caught = ((0.95, 0.15, 60.0), (1.4, 0.3, -60.0))
-    bumps = (40.0, 150.0, 80.0, 200.0, 60.0, 120.0, 90.0, 180.0, 50.0, 70.0)
-    handled = tuple((0.3 * k - 3.6, 0.006 + 0.0015 * k, peak) for k, peak in enumerate(bumps))
     heels = ((-3.45, 0.025, 250.0), (-2.85, 0.03, 300.0))
     four = tuple((begin, 0.012, 150.0) for begin in (-2.0, -1.5, 1.4, 1.9))
     scenes = {
@@ -313,18 +307,12 @@ def _scenes(add: Callable[..., None]) -> None:
         "steps on the plate before": Scene(before=4.0, treads=walk),
         "a man on the plate, steps off before": Scene(before=3.0, loads=(stood, left)),
         "a man steps off after": Scene(before=1.0, after=4.0, loads=(stood, leaves)),
-        "a man steps on after": Scene(before=1.0, after=4.0, treads=back),
         "handling before": Scene(before=4.0, loads=laid, taps=((-3.4, 0.02, 30.0),)),
-        "tap of 60 N before": Scene(before=2.0, taps=((-1.2, 0.004, 60.0),)),
-        "tap of 100 N before": Scene(before=2.0, taps=((-1.2, 0.006, 100.0),)),
         "tap of 150 N before": Scene(before=2.0, taps=((-1.2, 0.010, 150.0),)),
         "taps of 150 N": Scene(before=2.5, after=2.5, taps=four),
         "tap of 60 N 30 ms before": Scene(before=1.0, taps=((-0.030, 0.005, 60.0),)),
         "tap of 100 N 100 ms after": Scene(before=1.0, taps=((0.12, 0.005, 100.0),)),
-        "heel of 300 N after": Scene(before=1.0, after=3.0, taps=((2.0, 0.03, 300.0),)),
-        "ten bumps of 40 to 200 N before": Scene(before=4.0, taps=handled),
         "steps with heels on the plate before": Scene(before=4.0, treads=walk, taps=heels),
-        "tap of 300 N before": Scene(before=2.0, taps=((-1.2, 0.012, 300.0),)),
         "ball caught": Scene(before=0.5, after=2.0, loads=caught),
     }
     for name, scene in scenes.items():
@@ -365,19 +353,14 @@ def _files(add: Callable[..., None]) -> None:
         ("list of names", True, cells,
          {"channels": ["F1", "F2", "F3", "F4"], "calibration": listed}),
         ("not summed", False, equal, {"calibration": one}),
+        ("not summed, no mass or height", False, equal,
+         {"calibration": one, "mass": None, "height": None}),
         ("one of four", False, equal, {"calibration": one, "channel": "F1"}),
         ("one calibration, unequal", False, cells, {"channels": "sum", "calibration": one}),
         ("sum of three", False, equal, {"channels": "F1+F2+F3", "calibration": one}),
     )  # fmt: skip
     for name, told, some, config in stated:
         add("channels", name, told=told, chain=Chain(10e3), config=config, cells=some)
-    missing = {"mass": None, "height": None}
-    for files in ("newtons", "sound"):
-        more = {"chain": Chain(10e3), "cells": equal, "files": files}
-        add("channels", f"not summed, {files}", told=False, **more)
-        name = f"not summed, {files}, no mass or height"
-        add("channels", name, told=False, config=missing, **more)
-        add("channels", f"sum, {files}", config={"channels": "sum"}, **more)
 
 
 def _stated(add: Callable[..., None]) -> None:

@@ -178,14 +178,9 @@ class Pulse:
 
         The force is averaged over 0.1 ms within the contact.
         """
-        time = np.linspace(0, self.duration, 2001)
+        time = np.linspace(0, self.duration, 20_001)
         force = self.force(time)
-        top = int(force.argmax())
-        result = scipy.optimize.minimize_scalar(
-            lambda t: -float(self.force(np.array(t))),
-            bounds=(time[top - 1], time[top + 1]), method="bounded",
-        )  # fmt: skip
-        threshold = -THRESHOLD * result.fun
+        threshold = THRESHOLD * force.max()
 
         def above(t: float) -> float:
             nodes, weights = gauss(8)
@@ -204,13 +199,8 @@ class Pulse:
         """Return the maximum of the force below 1.25 kHz, N."""
         nodes, weights = panels(np.linspace(0, LIMIT, 13), 24)
         spectrum = 2 * weights * self.transform(nodes)
-        time = np.linspace(0, self.duration, 201)
-
-        def low(t: Array) -> Array:
-            return np.asarray((np.exp(2j * np.pi * np.outer(t, nodes)) @ spectrum).real)
-
-        top = int(low(time).argmax())
-        return float(low(np.linspace(time[max(top - 1, 0)], time[min(top + 1, 200)], 101)).max())
+        time = np.linspace(0, self.duration, 2001)
+        return float((np.exp(2j * np.pi * np.outer(time, nodes)) @ spectrum).real.max())
 
 
 def _stretched(term: Term, factor: float) -> Term:
@@ -227,73 +217,52 @@ def half_cosine(duration: float, peak: float) -> Pulse:
 # --- drops ------------------------------------------------------------------------------------
 
 KINDS = ("sine", "beta", "gamma", "cosines", "hertz", "exponential")
+# Ranges of duration, s, and of the parameters of `Skewed` by kind.
+SKEWED = {
+    "beta": ((0.018, 0.024), (0.9, 1.3), (1.2, 1.8), (0.0, 0.0)),
+    "gamma": ((0.020, 0.026), (0.9, 1.3), (1.3, 1.7), (0.5, 2.0)),
+    "hertz": ((0.020, 0.026), (1.5, 1.5), (1.5, 1.7), (0.0, 1.0)),
+}
 
 
 def _base(kind: str, rng: np.random.Generator) -> Pulse:
     """Return a pulse of a kind without ripple, of arbitrary size."""
     draw = rng.uniform
-    if kind == "sine":
+    terms: list[tuple[float, Term]]
+    if kind in SKEWED:
+        duration, *powers = (draw(*ends) for ends in SKEWED[kind])
+        terms = [(1.0, Skewed(duration, *powers))]
+    elif kind == "sine":
         duration = draw(0.0165, 0.022)
         terms = [(1.0, SinePower(duration, draw(1.0, 1.4)))]
-    elif kind == "beta":
-        duration = draw(0.018, 0.024)
-        terms = [(1.0, Skewed(duration, draw(0.9, 1.3), draw(1.2, 1.8)))]
-    elif kind == "gamma":
-        duration = draw(0.020, 0.026)
-        terms = [(1.0, Skewed(duration, draw(0.9, 1.3), draw(1.3, 1.7), draw(0.5, 2.0)))]
     elif kind == "cosines":
         duration = draw(0.022, 0.027)
         second = Cosine(draw(0.3, 0.4) * duration, draw(0.35, 0.5) * duration)
         terms = [(1.0, Cosine(duration / 2, duration)), (draw(0.15, 0.35), second)]
-    elif kind == "hertz":
-        duration = draw(0.020, 0.026)
-        terms = [(1.0, Skewed(duration, 1.5, draw(1.5, 1.7), draw(0.0, 1.0)))]
     else:
-        duration, slow = draw(0.019, 0.024), draw(0.6, 1.4)
-        power = draw(1.0, 1.3)
-        terms = [
-            (1.0, Skewed(duration, 0.0, power, slow)),
-            (-1.0, Skewed(duration, 0.0, power, slow + draw(7, 14))),
-        ]
+        duration, power, slow = draw(0.019, 0.024), draw(1.0, 1.3), draw(0.6, 1.4)
+        rise = Skewed(duration, 0.0, power, slow + draw(7, 14))
+        terms = [(1.0, Skewed(duration, 0.0, power, slow)), (-1.0, rise)]
     return Pulse(duration, tuple(terms))
 
 
 def random_pulse(kind: str, impulse: float, rng: np.random.Generator) -> Pulse:
-    """Return a pulse of a kind and an impulse, N s, with ripple.
+    """Return a pulse of a kind and an impulse, N s, with ripple, a burst.
 
-    The size of the ripple, a burst, is such that the octave of 500 Hz has 8 to 15 dB. Pulses with a
-    negative force, or with less than 6 dB in the octave of 250 Hz, are drawn again.
+    Pulses with a negative force, with less than 6 dB in the octave of 250 Hz, or with other than 8
+    to 15 dB in that of 500 Hz, are drawn again.
     """
-    nodes, weights = panels(np.array([MIDDLES[-1] / EDGE, MIDDLES[-1] * EDGE]), 24)
     while True:
         base = _base(kind, rng)
+        base = base.scaled(impulse / base.impulse)
         width = rng.uniform(0.005, 0.010)
         middle = rng.uniform(max(0.3 * base.duration, width / 2), 0.5 * base.duration)
         ripple = Cosine(middle, width, rng.uniform(300, 600), rng.uniform(0, 2 * np.pi))
-        wanted = 10 ** (rng.uniform(8, 15) / 10) / impulse**2
-        parts = [base, Pulse(base.duration, ((1.0, ripple),))]
-        first, second = (part.transform(nodes) for part in parts)
-        areas = [part.impulse for part in parts]
-        energies = [
-            2 * float(weights @ (x * y.conj()).real)
-            for x, y in ((second, second), (first, second), (first, first))
-        ]
-        # Both the energy and the square of the impulse are quadratic in the size of the ripple.
-        roots = np.roots(
-            [
-                energies[0] - wanted * areas[1] ** 2,
-                2 * (energies[1] - wanted * areas[0] * areas[1]),
-                energies[2] - wanted * areas[0] ** 2,
-            ]
-        )
-        if not np.isreal(roots).all():
-            continue
-        size = float(roots.real[np.abs(roots).argmin()])
-        pulse = Pulse(base.duration, (*base.terms, (size, ripple)))
+        pulse = Pulse(base.duration, (*base.terms, (rng.uniform(30, 300), ripple)))
         pulse = pulse.scaled(impulse / pulse.impulse)
-        time = np.linspace(0, pulse.duration, 801)
-        force = pulse.force(time)
-        if force.min() >= 0 and 900 < force.max() < 3000 and pulse.levels()[-2] > MIN_LEVEL:
+        force, levels = pulse.force(np.linspace(0, pulse.duration, 801)), pulse.levels()
+        is_ball = force.min() >= 0 and 900 < force.max() < 3000
+        if is_ball and levels[-2] > MIN_LEVEL and 8 < levels[-1] < 15:
             return pulse
 
 
