@@ -12,14 +12,12 @@ import time
 from concurrent.futures import ProcessPoolExecutor
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import pytest
 from conftest import naming
 from distributed import Client, LocalCluster
 
 import thud
 from thud.studies import run
-from thud.studies.run import evaluate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -96,14 +94,6 @@ def test_every_executor_gives_the_same(
             assert other.drop_attrs(deep=False).identical(expected), executor
     other = thud.sweep(STUDY, tmp_path, workers=3).dataset
     assert other.drop_attrs(deep=False).identical(expected)
-
-
-def test_threads_of_a_block_do_not_matter() -> None:
-    columns = {"height": np.linspace(0, 60, 200)}
-    one = evaluate(thud.read_study({"height": [1.0]}), columns, thud.__version__)
-    more = thud.solve_many(columns, thud.Case(), threads=3)
-    for name in ("peak_force", "margin", "status", "reason"):
-        np.testing.assert_array_equal(one[name], getattr(more, name))
 
 
 def kill_at_first_block(monkeypatch: pytest.MonkeyPatch, kill: Callable[[], None]) -> None:

@@ -54,6 +54,7 @@ if TYPE_CHECKING:
 TOKEN = "secret"  # noqa: S105 - of the test
 HEAD = {server.TOKEN: TOKEN}
 SHELL: dict[str, Any] = {"model": {"name": "hollow_sphere"}}
+MODAL: dict[str, Any] = {"model": {"name": "modal_ball"}}
 FLOOR: dict[str, Any] = {"floor": {"name": "plate"}}
 MODES: dict[str, Any] = {
     "model": {"name": "measured_modes"},
@@ -761,3 +762,77 @@ def test_page_that_leaves_while_it_waits_ends_its_work(path: str) -> None:
     application.state.jobs.run = work
     leave(application, path, json.dumps(SHELL).encode())
     assert ended == [path]
+
+
+BALL = thud.Case().resolved()
+TRUE_RATIO = 1.1
+
+
+@pytest.fixture(scope="module")
+def curve() -> tuple[np.ndarray, np.ndarray]:
+    """Return deflection, mm, and force, N, of a press, with noise of 1 N."""
+    exact = thud.compress(BALL.ball, BALL.model or "modal_ball", max_deflection=0.03, points=61)
+    noise = np.random.default_rng(1).normal(size=exact.force.size)
+    return 1e3 * exact.deflection, TRUE_RATIO * exact.force + noise
+
+
+def pressed(client: TestClient, titles: str, *columns: np.ndarray) -> dict[str, Any]:
+    """Return the answer of a fit to the columns of a press with titles."""
+    text = io.StringIO()
+    np.savetxt(text, np.column_stack(columns), "%.6g", ",", header=titles, comments="")
+    request = form_of(("press 1.csv", text.getvalue().encode()), case=MODAL)
+    answer: dict[str, Any] = last_report(client, "/press", **request)["answer"]
+    return answer
+
+
+@pytest.mark.parametrize(
+    ("titles", "scales"),
+    [
+        ('"Deflection, mm","Force, N"', (1.0, 1.0)),
+        ("deflection_m,force_N", (1e-3, 1.0)),
+        ("Weg [mm],Standardkraft [kN]", (1.0, 1e-3)),
+    ],
+)
+def test_modulus_is_that_of_the_curve_of_a_press(
+    client: TestClient,
+    curve: tuple[np.ndarray, np.ndarray],
+    titles: str,
+    scales: tuple[float, float],
+) -> None:
+    scaled = (scale * one for scale, one in zip(scales, curve, strict=True))
+    answer = pressed(client, titles, *scaled)
+    modulus = answer["values"]["ball"]["youngs_modulus"]
+    assert modulus == pytest.approx(TRUE_RATIO * BALL.ball.youngs_modulus, rel=0.02)
+    ((key, low, high),) = answer["intervals"]
+    assert key == "ball.youngs_modulus"
+    assert low < modulus < high
+    assert answer["file"] == "press 1.csv"
+    assert answer["is_explained"]
+
+
+def test_only_the_loading_branch_is_fitted_and_what_it_does_not_explain_is_said(
+    client: TestClient, curve: tuple[np.ndarray, np.ndarray]
+) -> None:
+    titles, (deflection, force) = "deflection (mm),force (N)", curve
+    both = [np.concatenate([x, x[-2::-1]]) for x in curve]
+    expected = pressed(client, titles, *curve)["values"]
+    assert pressed(client, titles, *both)["values"] == expected
+    answer = pressed(client, titles, deflection, force**2 / 400)
+    assert not answer["is_explained"]
+    assert answer["residual"][1] > 0.05
+
+
+EXPORTED = re.compile(r"^export (?:async )?(?:function|const|let|class) +(\w+)", re.MULTILINE)
+IMPORTED = re.compile(r'^import \{([^}]+)\} from "thud/([\w.]+)";$', re.MULTILINE)
+
+
+def test_each_name_that_a_module_of_the_page_imports_exists_and_is_used() -> None:
+    folder = Path(page_file.__file__).parent / "page"
+    texts = {file.name: file.read_text() for file in folder.glob("*.js")}
+    assert "showAll" in EXPORTED.findall(texts["doors.js"])
+    for name, text in texts.items():
+        for listed, module in IMPORTED.findall(text):
+            names = [word.strip() for word in listed.split(",") if word.strip()]
+            assert set(names) <= set(EXPORTED.findall(texts[module])), f"{name} from {module}"
+            unused = [one for one in names if len(re.findall(rf"\b{one}\b", text)) < 2]
+            assert not unused, f"{name}: {unused}"

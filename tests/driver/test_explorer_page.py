@@ -1028,16 +1028,6 @@ def test_tab_goes_from_the_doors_through_the_inputs_to_the_results(page: Page) -
         assert stops == sorted(stops, reverse=True)
 
 
-def test_column_of_inputs_ends_with_a_whole_row_and_its_folded_fields(page: Page) -> None:
-    more = page.locator("#inputs .folded summary")
-    expect(more).to_be_in_viewport(ratio=1)
-    end = more.evaluate("box => box.getBoundingClientRect().top")
-    for row in page.locator("#inputs .field:visible").all():
-        box = row.bounding_box()
-        assert box
-        assert box["y"] >= end or box["y"] + box["height"] <= end
-
-
 def test_phone_shows_the_whole_answer_and_hides_no_field(browser: Browser, server: Served) -> None:
     page = new_page(browser, server[0], 400)
     # A headline as long as they come.

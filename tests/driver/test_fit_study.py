@@ -98,18 +98,6 @@ def test_window_without_an_end_is_saved(tmp_path: Path) -> None:
     assert saved["study"]["target"]["window"] == [0, "Infinity"]
 
 
-def test_results_are_replaced_as_a_whole(tmp_path: Path) -> None:
-    both = ["fit", "-q", "study.toml", "-o", "found"]
-    (tmp_path / "study.toml").write_text(f"{STUDY}height = {{}}\n")
-    assert cli.main(both) == 0
-    assert (tmp_path / "found/confidence.svg").exists()
-    # A study of levels with one parameter has no regions.
-    levels = "levels = [39, 31, 23, 17, 12]"
-    (tmp_path / "study.toml").write_text(STUDY.replace('file = "record.csv"', levels))
-    assert cli.main(both) == 0
-    assert names_in(tmp_path / "found") == FILES
-
-
 def test_useless_directory_is_reported_before_the_search(
     tmp_path: Path, errors_of: ErrorsOf, monkeypatch: pytest.MonkeyPatch
 ) -> None:
