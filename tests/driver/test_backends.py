@@ -4,12 +4,8 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-import re
 import signal
-import subprocess
-import sys
-import time
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -41,23 +37,23 @@ MODAL: dict[str, Any] = {
     "fixed": {"model": "modal_ball", "rings": 20},
     "parameters": {"height": {"low": 0.9, "high": 1.1}},
 }
-# A scheduler and a worker in one process, which can be killed.
-DOOMED = """
-from distributed import LocalCluster
-cluster = LocalCluster(
-    n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address=":0"
-)
-print(cluster.scheduler_address, flush=True)
-input()
-"""
-# A study whose samples a scheduler computes.
-BY_DASK = """
-import sys, thud
-from distributed import Client
-study, folder, address = sys.argv[1:]
-executor = Client(address, set_as_default=False).get_executor()
-thud.sweep(study, folder, executor=executor)
-"""
+
+
+class Cancelling(Executor):
+    """An executor that computes two blocks and then loses its scheduler."""
+
+    submitted = 0
+
+    def submit(self, function: Callable[..., Any], *block: Any) -> Future[Any]:  # type: ignore[override] # noqa: ANN401
+        """Compute one of the first two blocks, or cancel it."""
+        self.submitted += 1
+        future: Future[Any] = Future()
+        if self.submitted > 2:
+            future.cancel()
+            future.set_running_or_notify_cancel()
+        else:
+            future.set_result(function(*block))
+        return future
 
 
 @pytest.fixture(scope="module")
@@ -108,14 +104,6 @@ def kill_at_first_block(monkeypatch: pytest.MonkeyPatch, kill: Callable[[], None
     monkeypatch.setattr(run, "write_dataset", kill_and_write)
 
 
-def assert_goes_on(study: Path | dict[str, Any], partial: Path, expected: xr.Dataset) -> None:
-    """Check that some blocks of a study are finished and that a further run computes the others."""
-    finished = thud.read_sweep(partial).dataset.sizes["sample"]
-    assert 0 < finished < MODAL["design"]["size"]
-    found = thud.sweep(study, partial.parent).dataset
-    assert found.drop_attrs(deep=False).identical(expected)
-
-
 @pytest.mark.slow
 def test_killed_worker_of_dask_loses_nothing(
     cluster: LocalCluster,
@@ -131,34 +119,9 @@ def test_killed_worker_of_dask_loses_nothing(
     assert found.drop_attrs(deep=False).identical(expected_modal)
 
 
-@pytest.mark.slow
-def test_lost_scheduler_is_reported_and_its_study_goes_on_elsewhere(
-    expected_modal: xr.Dataset, tmp_path: Path
-) -> None:
-    study = tmp_path / "some.toml"
-    study.write_text(
-        f"design = {{kind='random', size={MODAL['design']['size']}}}\n"
-        "fixed = {model='modal_ball', rings=20}\nparameters.height = {low=0.9, high=1.1}"
-    )
-    with subprocess.Popen(
-        [sys.executable, "-c", DOOMED], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    ) as doomed:
-        assert doomed.stdout
-        address = doomed.stdout.readline().strip()
-        command = [sys.executable, "-c", BY_DASK, str(study), str(tmp_path), address]
-        process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-        while not list(tmp_path.glob("some.partial/block_*.nc")):
-            assert process.poll() is None
-            time.sleep(0.01)
-        doomed.kill()
-    _, errors = process.communicate()
-    assert process.returncode == 1
-    assert re.search(naming("NumericalError", "executor", "Cancelled"), errors)
-    assert_goes_on(study, tmp_path / "some.partial", expected_modal)
-
-
-def test_lost_process_is_reported_and_finished_blocks_are_kept(
-    expected_modal: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("is_killed", [True, False])
+def test_lost_executor_is_reported_and_finished_blocks_are_kept(
+    expected_modal: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, is_killed: bool
 ) -> None:
     others = set(multiprocessing.active_children())
 
@@ -166,10 +129,16 @@ def test_lost_process_is_reported_and_finished_blocks_are_kept(
         for child in set(multiprocessing.active_children()) - others:
             child.kill()
 
-    kill_at_first_block(monkeypatch, kill)
-    with (
-        ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as processes,
-        pytest.raises(thud.NumericalError, match=naming("executor", "run the study again")),
-    ):
-        thud.sweep(MODAL, tmp_path, executor=processes)
-    assert_goes_on(MODAL, tmp_path / "python.partial", expected_modal)
+    if is_killed:
+        kill_at_first_block(monkeypatch, kill)
+        executor: Executor = ProcessPoolExecutor(2, multiprocessing.get_context("spawn"))
+    else:
+        executor = Cancelling()
+    words = naming("executor", "run the study again", *([] if is_killed else ["Cancelled"]))
+    with executor, pytest.raises(thud.NumericalError, match=words):
+        thud.sweep(MODAL, tmp_path, executor=executor)
+    finished = thud.read_sweep(tmp_path / "python.partial").dataset.sizes["sample"]
+    assert 0 < finished < MODAL["design"]["size"]
+    # A further run computes the others.
+    found = thud.sweep(MODAL, tmp_path).dataset
+    assert found.drop_attrs(deep=False).identical(expected_modal)
