@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import re
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import codes, names_in, naming, quiet_fit
+from conftest import REPOSITORY, codes, naming, quiet_fit
 from scipy import stats
 
 import thud
-from thud import cli
 from thud.studies.fit import read_fit_study
 from thud.studies.fitting.comparison import UNLIKELY
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from numpy.typing import NDArray
 
     Record = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -38,19 +34,6 @@ CASE = thud.Case(
     model=thud.HollowSphere(),
 )
 TRUTH = {"youngs_modulus": 1.8e6, "mass": 2.5}
-STUDY = """
-fixed = { duration = 0.03, model = "hollow_sphere" }
-[[target]]
-file = "drop_1.csv"
-fixed = { height = { value = 10, unit = "cm" } }
-[[target]]
-file = "drop_2.csv"
-fixed = { height = 1.0 }
-gain = 0.02
-[parameters]
-youngs_modulus = { start = 1.6, unit = "MPa" }
-mass = { start = 2.4 }
-"""
 
 
 def record(case: thud.Case, height: float, noise: float, seed: int, offset: float = 0.0) -> Record:
@@ -81,6 +64,11 @@ def test_three_heights_give_modulus_and_mass(drops: list[Record]) -> None:
     fit = thud.fit(targets_of(drops), {"youngs_modulus": 1.6e6, "mass": 2.4}, CASE)
     assert not fit.warnings
     assert fit.names[2:] == ("time_shift(1)", "time_shift(2)", "time_shift(3)")
+    study = read_fit_study(REPOSITORY / "inputs/studies/fit_heights.toml")
+    assert [term.case.drop.height for term in study.terms] == [*HEIGHTS]
+    figures = {name for name in study.files if name.endswith("svg")}
+    assert {*study.files} - figures == {*fit.files()} >= {"fit_3.csv", "fitted_1.nml", "fit.json"}
+    assert figures == {f"{name}.svg" for name in fit.figures()}
     for name, value in TRUTH.items():
         assert abs(fit.values[name] - value) < FAR * fit.standard_errors[name]
     for number, target in enumerate(fit.targets):
@@ -160,27 +148,3 @@ def test_largest_correlation_is_stated() -> None:
     assert strong[i, j] > 0.9
     pair = f"{fit.names[i]} and {fit.names[j]}"
     assert re.search(rf"correlation: \S*{strong[i, j]:.4f} of {pair}", str(fit))
-
-
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, drops: list[Record]) -> Path:
-    """Write two drops as tables and go to their directory."""
-    monkeypatch.chdir(tmp_path)
-    for number, drop in enumerate(drops[:2], start=1):
-        np.savetxt(f"drop_{number}.csv", np.column_stack(drop), delimiter=",", fmt="%.9f")
-    return tmp_path
-
-
-def test_study_of_several_records(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (folder / "study.toml").write_text(STUDY)
-    assert cli.main(["fit", "-o", "found", "study.toml"]) == 0
-    assert "gain(2)" in capsys.readouterr().out
-    names = set(names_in(folder / "found"))
-    assert {"fit_1.csv", "fit_2.csv", "fitted_2.nml", "fit_2.svg", "fit.json"} < names
-    assert names == {*read_fit_study("study.toml").files, "thud.txt"}
-    saved = json.loads((folder / "found/fit.json").read_text())
-    for name, truth in TRUTH.items():
-        entry = saved["parameters"][name]
-        assert abs(entry["value"] - truth) < FAR * entry["standard_error"]
-    assert not saved["warnings"]
-    assert thud.read_case(folder / "found/fitted_1.nml").drop.height == 0.1

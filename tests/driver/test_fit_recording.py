@@ -154,5 +154,3 @@ def test_studies_of_the_repository_can_be_read(name: str) -> None:
     assert term.comparison.unit_deviation == pytest.approx(5.0, rel=FAR / np.sqrt(2 * 450))
     viscosity = "constant_loss" if "constant" in name else "kelvin_voigt"
     assert study.case.model.viscosity == viscosity
-    heights = read_fit_study(REPOSITORY / "inputs/studies/fit_heights.toml").terms
-    assert [term.case.drop.height for term in heights] == [0.1, 1.0, 1.6]
