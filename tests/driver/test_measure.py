@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import pickle
-import subprocess
-import sys
 import tomllib
 from dataclasses import replace
 from datetime import date
@@ -266,46 +263,6 @@ def test_drops_without_a_restitution_are_noted() -> None:
     recording = thud.read_recording(files, config=replace(LAB, mass=None))
     note = noted(recording.notes, "restitution_partly_known")
     assert (note.value, note.high) == (3, 4)
-
-
-@pytest.mark.slow
-def test_results_are_there_where_the_screen_takes_nothing(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "thud", "measure", str(FOLDER / DROPS[0]["file"])]
-    with open("/dev/full", "w") as full:  # noqa: PTH123 - a device
-        done = subprocess.run(
-            [*command, "--config", str(FOLDER / "lab.toml"), "-o", "out"],
-            cwd=tmp_path,
-            stdout=full,
-            stderr=subprocess.PIPE,
-            text=True,
-            check=False,
-        )
-    assert done.returncode == 1
-    assert done.stderr.count("standard output") == 1
-    assert (tmp_path / "out/report.json").exists()
-
-
-def test_drops_hold_no_more_than_their_force() -> None:
-    recording = example("three_drops.flac")
-    for drop in recording.drops:
-        known = 3 * drop.force.nbytes + drop.contact.covariance.nbytes
-        assert len(pickle.dumps(drop)) < known + 20_000
-
-
-def test_outliers_of_all_quantities_are_marked() -> None:
-    time = np.arange(0, 0.02, 1 / 24_000)
-    pulse = 1500 * np.sin(np.pi * time / 0.02)
-    longer = 1500 * np.sin(np.pi * np.arange(0, 0.021, 1 / 24_000) / 0.021)
-    pieces = [make_recording(pulse, 24_000, noise_db=60, seed=i)[0] for i in range(6)]
-    pieces.insert(3, make_recording(longer, 24_000, noise_db=60, seed=9)[0])
-    found = thud.read_recording(
-        Signal.from_array(np.concatenate(pieces), 24_000), height=1.0, mass=2.5
-    )
-    marked = {str(outlier.others["quantity"]).split(",")[0] for outlier in found.outliers}
-    assert {"contact time", "restitution"} <= marked
-    assert {outlier.subject for outlier in found.outliers} == {"recording, drop 4"}
-    assert len(found.drops) == 7
-    assert all(outlier in found.notes for outlier in found.outliers)
 
 
 def test_plate_is_compared_with_the_standard() -> None:
