@@ -41,7 +41,9 @@ def test_rounded_times_are_even(form: str, begin: float) -> None:
     assert record.sample_rate == pytest.approx(
         RATE, rel=4 * digit / np.sqrt(3) * RATE * np.sqrt(12 / 500**3) + 1e-9
     )
-    assert record.time[0] == pytest.approx(begin, abs=digit + 1e-12)
+    # The begin of the line has 2/sqrt(n) of that of a time.
+    deviation = 2 * digit / np.sqrt(3 * 500)
+    assert record.time[0] == pytest.approx(begin, abs=4 * deviation + 1e-12)
 
 
 @given(
@@ -87,12 +89,8 @@ def test_columns_are_read_whatever_is_between(  # noqa: PLR0913, PLR0917 - each 
     ("line", "expected"),
     [
         ("0.100020;1,575", (0.10002, 1575)),
-        ("0.100020\t1,575", (0.10002, 1575)),
-        ("0.100020 1,575", (0.10002, 1575)),
         ('"0.100020","1,575"', (0.10002, 1575)),
         ("0,100020;1,575", (0.10002, 1.575)),
-        ("0,100020\t1.575", (0.10002, 1575)),
-        ("0,100020 1.575", (0.10002, 1575)),
         ('"0,100020","1.575"', (0.10002, 1575)),
         ("0.100020,1.575", (0.10002, 1.575)),
         ("12,345.5;-1,234,567.25", (12345.5, -1234567.25)),
@@ -128,13 +126,6 @@ def test_empty_lines_behind_a_table_are_left_out(
     monkeypatch.setattr(table, "BLOCK", 8)
     (tmp_path / "plate.csv").write_text("7, 0.250\n" * 8 + empty)
     np.testing.assert_array_equal(read_table(tmp_path / "plate.csv"), [(7, 0.25)] * 8)
-
-
-def test_rounded_times_do_not_move_the_fit() -> None:
-    impact = thud.solve(duration=0.03)
-    fit = thud.fit(((impact.time + 0.2).round(6), impact.floor_force), ["youngs_modulus"])
-    # Of 1323 times rounded to 1 us the mean is off by 1 us / sqrt(12 * 1323); four of that.
-    assert fit.values["time_shift"] == pytest.approx(0.2, abs=4e-6 / np.sqrt(12 * 1323))
 
 
 @pytest.mark.parametrize("digits", [5, 6, 7, 9, 16])
