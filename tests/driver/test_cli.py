@@ -133,16 +133,6 @@ def test_files_named_as_modules_of_python_are_not_imported(
     assert (tmp_path / "outputs/case/force.csv").exists()
 
 
-def test_interruption_is_not_a_traceback(
-    case_file: CaseFile, monkeypatch: pytest.MonkeyPatch, errors_of: ErrorsOf
-) -> None:
-    def interrupt(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(sys.modules["thud.cli.case_commands"], "ask", interrupt)
-    assert "interrupted" in errors_of("run", case_file(MINIMAL), code=130)
-
-
 def test_cases_of_one_name_do_not_replace_each_other(
     case_file: CaseFile, tmp_path: Path, errors_of: ErrorsOf
 ) -> None:

@@ -22,7 +22,7 @@ BLOCK = re.compile(
 # The parts of programs in how_to_add are tested with the programs.
 PAGES = [
     page
-    for page in sorted((REPOSITORY / "docs").glob("*.md"))
+    for page in [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").glob("*.md"))]
     if "```python" in page.read_text(encoding="utf-8") and page.stem != "how_to_add"
 ]
 

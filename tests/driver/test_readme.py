@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import io
 import re
 
 import pytest
@@ -40,15 +38,6 @@ def test_first_result_is_that_of_the_commands() -> None:
 def test_outputs_fit_a_terminal() -> None:
     for _, text in BLOCK.findall(README):
         assert max(map(len, text.splitlines())) <= WIDTH
-
-
-@pytest.mark.slow
-def test_python_example_prints_what_is_shown() -> None:
-    (_, code), (_, shown) = BLOCK.findall(README)
-    printed = io.StringIO()
-    with contextlib.redirect_stdout(printed):
-        exec(compile(code, "README.md", "exec"), {})  # noqa: S102 - our own
-    assert printed.getvalue() == shown
 
 
 def test_commands_exist() -> None:
