@@ -234,7 +234,7 @@ def command_lines(draw: st.DrawFn) -> list[str]:
 
 
 @given(line=command_lines())
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_any_command_line_ends_with_a_code_and_one_sentence(line: list[str]) -> None:
     said = io.StringIO()
     with tempfile.TemporaryDirectory() as folder, chdir(folder):

@@ -33,6 +33,7 @@ def test_run_writes_results_and_figures(
     assert "does not conform" in output
     before = contents(tmp_path / "outputs/ball")
     assert cli.main(["run", "-q", "ball.nml"]) == 0
+    assert capsys.readouterr().out == ""
     assert contents(tmp_path / "outputs/ball") == before
 
 
