@@ -45,15 +45,6 @@ def floor() -> PredictedFloor:
     return predicted(volume=40.0, required=49.0)
 
 
-@pytest.fixture(scope="module")
-def page(floor: PredictedFloor, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the directory of a page."""
-    folder = tmp_path_factory.mktemp("predict")
-    for name, content in page_contents(floor, folder).items():
-        (folder / name).write_bytes(content)
-    return folder
-
-
 def text_of(floor: PredictedFloor) -> str:
     """Return the text of the page of a floor."""
     text = re.sub(r"<style.*?</style>", "", floor_page(floor, b"", b""), flags=re.DOTALL)
@@ -211,19 +202,6 @@ def test_floor_without_modes_is_reported(tmp_path: Path) -> None:
     assert "Lowest natural frequencies" in floor_page(floor, b"", b"")
 
 
-def test_pdf_has_two_pages_with_the_rating(floor: PredictedFloor, page: Path) -> None:
-    pdfium = pytest.importorskip("pypdfium2", reason="pypdfium2 is not installed")
-    document = pdfium.PdfDocument(page / f"{floor.file}.pdf")
-    first, second = (sheet.get_textpage().get_text_bounded() for sheet in document)
-    assert str(floor.prediction.rating) in " ".join(first.split())
-    assert "Assumptions" in first
-    assert all(str(note)[:40] in " ".join(first.split()) for note in floor.prediction.notes)
-    assert "What would change it" in f"{first}{second}"
-    assert "end of report" in second
-    for sheet in document:
-        assert (round(sheet.get_width()), round(sheet.get_height())) == (595, 842)
-
-
 def test_changes_are_predictions_of_the_changed_floor(floor: PredictedFloor) -> None:
     changes = {change.text: change.difference for change in floor.changes}
     prediction = floor.prediction
@@ -240,20 +218,26 @@ def test_changes_are_predictions_of_the_changed_floor(floor: PredictedFloor) -> 
     assert {"floating plate +10 mm", "mass of the ceiling doubled"} < changes.keys()
     sizes = [*map(abs, changes.values())]
     assert sizes == sorted(sizes, reverse=True)
-    # A change out of range is not listed.
-    heavy = thud.predict_level(
-        floor=thud.Plate(), room=thud.Room(ceiling_mass=150.0, reverberation_time=0.05)
-    )
-    changes = {change.text: change.difference for change in PredictedFloor("a", "a", heavy).changes}
-    assert "mass of the ceiling doubled" not in changes
-    assert changes["bearing plate +10 mm"] < 0
+    # A change out of range is not listed: 150 kg/m2 doubled, not of a subceiling either.
+    hung = thud.Plate(subceiling_thickness=0.0125, length=2.0, width=1.2)
+    for deck, mass in ((hung, 0.0), (thud.Plate(), 150.0)):
+        room = thud.Room(ceiling_mass=mass, reverberation_time=0.05)
+        other = PredictedFloor("a", "a", thud.predict_level(floor=deck, room=room))
+        texts = {change.text: change.difference for change in other.changes}
+        assert "mass of the ceiling doubled" not in texts
+        assert texts["bearing plate +10 mm"] < 0
+        assert (texts.get("mass of the subceiling doubled", 0) < 0) == (deck is hung)
+        assert (texts.get("stiffness of the channels halved", 0) < 0) == (deck is hung)
 
 
 @pytest.mark.parametrize(
     ("plate", "materials"),
     [
         (thud.Plate(screed_thickness=0.05), ["floating plate", "resilient layer", "plate"]),
-        (thud.JoistFloor(), ["sheathing", "joists, 60 mm wide, 0.4 m apart"]),
+        (
+            thud.JoistFloor(length=2.0, width=1.2, subceiling_thickness=0.0125, cavity_depth=0.25),
+            ["sheathing", "joists, 60 mm wide, 0.4 m apart", "cavity", "subceiling"],
+        ),
         (
             thud.LaminateFloor(added_mass=90.0),
             ["added mass, 90 kg/m²", *["lamella, along", "lamella, across"] * 2, "lamella, along"],
@@ -261,43 +245,26 @@ def test_changes_are_predictions_of_the_changed_floor(floor: PredictedFloor) -> 
     ],
 )
 def test_layers_of_a_case_are_those_of_its_keys(plate: thud.Plate, materials: list[str]) -> None:
-    room = thud.Room(ceiling_mass=9.0, ceiling_depth=0.25, reverberation_time=0.05)
+    hung = isinstance(plate, thud.JoistFloor)
+    room = thud.Room(ceiling_mass=9.0 * (not hung), ceiling_depth=0.25, reverberation_time=0.05)
     floor = PredictedFloor("a", "a", thud.predict_level(floor=plate, room=room))
     layers = floor.layers
-    for layer, material in zip(layers, [*materials, "cavity", "ceiling"], strict=True):
+    ceiling = [] if hung else ["cavity", "ceiling"]
+    for layer, material in zip(layers, [*materials, *ceiling], strict=True):
         assert layer.description.startswith(material)
-    depth = 0.03 if "joists" in materials[-1] else 0.25
-    assert layers[-2].thickness == pytest.approx(depth)
+    # Between joists the cavity is 0.03 m deep below them.
+    assert layers[-2].thickness == pytest.approx(0.03 if hung else 0.25)
     if isinstance(plate, thud.LaminateFloor):
         assert [layer.thickness for layer in layers[:6]] == pytest.approx(
             [0.06, 0.04, 0.02, 0.04, 0.02, 0.04]
         )
     rows = {meaning: (value, source) for meaning, value, source in floor.assumptions}
-    assert rows["mass per unit area of a suspended ceiling; 0: none"] == (
-        "9 kg/m²",
-        "stated in the case",
-    )
+    if not hung:
+        meaning = "mass per unit area of a suspended ceiling; 0: none"
+        assert rows[meaning] == ("9 kg/m²", "stated in the case")
+    assert any("subceiling" in meaning for meaning in rows) == hung
     assert "width of the floor" in " ".join(rows)
     assert_clean(draw_levels(floor.prediction))
-
-
-def test_subceiling_is_in_the_section_the_changes_and_the_page(shell: thud.Impact) -> None:
-    joists = thud.JoistFloor(length=2.0, width=1.2)
-    # With few modes in the room.
-    room = thud.Room(height=2.5, reverberation_time=(0.06,))
-    hung = replace(joists, subceiling_thickness=0.0125, cavity_depth=0.25)
-    floor = PredictedFloor("a", "a", thud.predict_level(shell, hung, room))
-    materials = [(layer.material.split(",")[0], layer.thickness) for layer in floor.layers]
-    assert materials[-2:] == [("cavity", 0.03), ("subceiling", 0.0125)]
-    changes = {change.text: change.difference for change in floor.changes}
-    assert changes["mass of the subceiling doubled"] < -3
-    assert changes["stiffness of the channels halved"] < 0
-    meanings = [meaning for meaning, *_ in floor.assumptions]
-    assert any("depth of the air between floor and subceiling" in text for text in meanings)
-    bare = PredictedFloor("b", "b", thud.predict_level(shell, joists, room))
-    assert not any("subceiling" in meaning for meaning, *_ in bare.assumptions)
-    assert "9 kg/m²" in text_of(floor)
-    assert "none described" in text_of(bare)
 
 
 def test_hostile_names_are_text(floor: PredictedFloor, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -306,7 +273,6 @@ def test_hostile_names_are_text(floor: PredictedFloor, monkeypatch: pytest.Monke
     page = floor_page(replace(floor, name=name), b"", b"")
     assert "<script>" not in page
     assert str(escape(name)) in page
-    assert "not drawn" in page
 
 
 def test_workbook_has_every_table(floor: PredictedFloor) -> None:
@@ -324,11 +290,6 @@ def test_workbook_has_every_table(floor: PredictedFloor) -> None:
     assert rows == [("=1+1", *row) for row in floor.assumptions[1:]]
     texts = [row[1] for row in book["warnings"].iter_rows(min_row=2, values_only=True)]
     assert texts == list(map(str, floor.prediction.notes))
-    for sheet in book:
-        assert sheet.freeze_panes == "B2"
-        for cell in sheet[1]:
-            width = sheet.column_dimensions[cell.column_letter].width
-            assert width > min(len(cell.value), 54)
 
 
 @pytest.mark.parametrize("name", ["../evil", ".hidden"])
@@ -343,18 +304,7 @@ def test_names_of_cases_stay_in_the_directory(name: str, tmp_path: Path) -> None
     assert {*tmp_path.iterdir()} <= {*before, out}
 
 
-def test_tyre_falls_on_constructions(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    tyre = str(REPOSITORY / "inputs" / "tyre.nml")
-    words = ["predict", tyre, "--construction", "concrete 180", "-o", str(tmp_path / "out")]
-    assert cli.main(words) == 0
-    printed = capsys.readouterr().out
-    assert printed.startswith("concrete 180\n  A-weighted level ")
-    assert "ISO 717-2" not in printed
-    case = thud.construction("concrete 180").case(thud.read_case(tyre))
-    assert str(thud.predict_level(thud.solve(case)).rating) in " ".join(printed.split())
-
-
-def test_source_that_does_not_conform_is_beside_the_rating(tmp_path: Path) -> None:
+def test_source_that_does_not_conform_is_beside_the_rating() -> None:
     case = thud.Case(floor=thud.Plate(), room=thud.Room(volume=66.092), drop=thud.Drop(height=0.1))
     floor = PredictedFloor("low", "low", thud.predict_level(thud.solve(case)))
     note = "the source does not conform"
@@ -362,8 +312,6 @@ def test_source_that_does_not_conform_is_beside_the_rating(tmp_path: Path) -> No
     page = floor_page(floor, b"", b"")
     box = page.partition('class="verdict">')[2].partition("</div>")[0]
     assert note.capitalize() in box
-    ratings = read_table(contents([floor], tmp_path, report=False)["ratings.csv"])
-    assert not [row for row in ratings if re.search(r"class \d", row["text"])]
 
 
 def test_numbers_of_the_report_have_no_exponent_and_few_digits() -> None:
@@ -374,14 +322,13 @@ def test_numbers_of_the_report_have_no_exponent_and_few_digits() -> None:
     floor = PredictedFloor("soft", "soft", prediction)
     text = text_of(floor)
     assert "66.1 m³" in text
-    assert "dropped from 1 m, 4.43 m/s" in text
     assert not re.search(r"\d+e[-+−]\d", text)
     assert not re.search(r"\de[-+−]\d", str(band_rows(floor)))
     for value, row in zip(prediction.energy, band_rows(floor)[1:], strict=True):
         assert float(row[2]) == pytest.approx(1e6 * value, rel=5e-3)
 
 
-def test_report_with_all_assumptions_has_two_pages(tmp_path: Path) -> None:
+def test_report_with_all_assumptions_has_two_pages_of_a4(tmp_path: Path) -> None:
     """Two lines of default values were on a page of their own."""
     pytest.importorskip("weasyprint")
     pdfium = pytest.importorskip("pypdfium2", reason="pypdfium2 is not installed")
@@ -395,8 +342,15 @@ def test_report_with_all_assumptions_has_two_pages(tmp_path: Path) -> None:
     prediction = thud.predict_level(thud.solve(built.case(thud.Case(room=room))))
     details = ("Project", "House A"), ("Client", "B"), ("Date", "2026-01-01")
     floor = PredictedFloor(built.name, "joists", prediction, built, details)
-    page = page_contents(floor, tmp_path)["joists.pdf"]
-    assert len(pdfium.PdfDocument(page)) == 2
+    document = pdfium.PdfDocument(page_contents(floor, tmp_path)["joists.pdf"])
+    texts = [" ".join(sheet.get_textpage().get_text_bounded().split()) for sheet in document]
+    assert len(texts) == 2
+    assert str(prediction.rating) in texts[0]
+    assert all(str(note)[:40] in texts[0] for note in prediction.notes)
+    assert "What would change it" in "".join(texts)
+    assert "end of report" in texts[1]
+    sizes = {(round(sheet.get_width()), round(sheet.get_height())) for sheet in document}
+    assert sizes == {(595, 842)}
 
 
 def test_floor_with_stated_edges_has_no_contribution_of_them() -> None:
