@@ -92,19 +92,6 @@ def test_recordings_say_what_is_doubtful_and_have_their_names(shell: thud.Impact
         assert all(note.subject in own.subject for note, own in zip(expected, found, strict=True))
 
 
-def test_recording_stands_beside_its_model(shell: thud.Impact) -> None:
-    recording = recorded(shell, calibration_uncertainty=0.001)
-    assert recording.sample_rate == pytest.approx(44100)
-    assert recording.contact_time == pytest.approx(shell.contact_time, abs=0.3e-3)
-    assert recording.peak_force == pytest.approx(shell.peak_force, abs=3)
-    np.testing.assert_allclose(recording.levels(), shell.levels(force="floor"), atol=0.1)
-    comparison = thud.compare({"model": shell, "plate": recording})
-    plate = column(comparison, 2)
-    assert plate["restitution"] == plate["mass, kg"] == "unknown"
-    assert plate["verdict"] == "does not conform"
-    assert "computing time, ms" not in plate
-
-
 @pytest.mark.usefixtures("working_directory")
 def test_command_writes_the_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     record = REPOSITORY / "inputs/recordings/drop_1.csv"
@@ -154,10 +141,12 @@ def test_drops_of_one_speed_are_compared_and_times_are_those_of_cases(shell: thu
 
 def test_impact_and_recording_answer_the_same_questions(shell: thud.Impact) -> None:
     record = recorded(shell, height=1.0, mass=2.5)
+    assert record.contact_time == pytest.approx(shell.contact_time, abs=0.3e-3)
+    assert record.levels() == pytest.approx(shell.levels(force="floor"), abs=0.1)
     for one in (shell, record):
         assert one.mass == 2.5
         assert one.impact_velocity == pytest.approx(4.429, abs=1e-3)
-        assert one.peak("floor") == one.peak_force == pytest.approx(1574, rel=0.02)
+        assert one.peak("floor") == one.peak_force == pytest.approx(1574, abs=3)
         assert one.quantity("impulse") == pytest.approx(shell.impulse, rel=0.01)
         assert one.limits_source in (None, "rubber_ball")
         drop = thud.blocked_force(one)
@@ -166,3 +155,6 @@ def test_impact_and_recording_answer_the_same_questions(shell: thud.Impact) -> N
         dataset = one.to_xarray()
         assert dataset["floor_octave"].to_numpy() == pytest.approx(one.levels(force="floor"))
         assert dataset["floor_third"].size == 15
+    plate = column(thud.compare({"plate": recorded(shell)}))
+    assert plate["restitution"] == plate["mass, kg"] == "unknown"
+    assert "computing time, ms" not in plate

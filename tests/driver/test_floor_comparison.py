@@ -6,24 +6,18 @@ import html
 import math
 import re
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from conftest import REPOSITORY, names_in, noted
+from conftest import REPOSITORY, noted
 from test_figure_look import assert_clean
 
 import thud
 from thud.base.bridge import ask
 from thud.case.case import case_text
-from thud.cli import main
 from thud.floors.description import rating_title
 from thud.floors.tapping import FREQUENCY
 from thud.level.rating import class_text
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
 
 # ISO 12354, 220 mm floor of 5 m x 4 m: thirds 50 to 630 Hz.
 PUBLISHED = [57.3, 58.2, 59.2, 60.2, 61.1, 62.1, 62.5, 62.7, 63.0, 63.3, 63.6, 64.0]
@@ -186,39 +180,6 @@ def test_page_draws_chain_and_ratings(found: thud.FloorComparison) -> None:
     ):
         assert any(values == pytest.approx(wanted) for values in drawn)
     assert found.files()["floors.html"].count(b'"curves": ') == 4
-
-
-def test_command_compares_cases(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    paths = [str(tmp_path / f"{name}.nml") for name in CASES]
-    for path, case in zip(paths, CASES.values(), strict=True):
-        thud.write_case(case, path)
-    output = tmp_path / "page"
-    assert main(["floor", *paths, "--output", str(output)]) == 0
-    assert set(names_in(output)) == {"thud.txt", "floors.svg", "floors.html"}
-    assert "thick" in capsys.readouterr().out
-
-
-def test_synthetic_survey_gives_back_what_was_put_into_it(tmp_path: Path) -> None:
-    """A survey made of the prediction, shifted by 2 dB, with scatter, background and decay."""
-    prediction = thud.predict_level(thud.solve(), thud.Plate(), thud.Room())
-    draw = np.random.default_rng(5)
-    # Levels whose energy mean is the prediction and 2 dB: offsets with an energy mean of one.
-    offsets = draw.normal(scale=2.0, size=(8, 12))
-    offsets -= 10 * np.log10((10 ** (offsets / 10)).mean(axis=0))
-    levels = prediction.level + 2.0 + offsets
-    background = prediction.level - 20
-    noisy = 10 * np.log10(10 ** (levels / 10) + 10 ** (background / 10))
-    columns = np.column_stack([prediction.frequency, noisy.T, background, np.full(12, 0.5)])
-    path = tmp_path / "survey.csv"
-    names = ",".join(f"P{i}" for i in range(1, 9))
-    header = f"frequency,{names},background,reverberation_time"
-    np.savetxt(path, columns, delimiter=",", header=header, comments="")
-    measured = thud.read_room_levels(path, volume=50.0)
-    # Backgrounds more than 15 dB below are not subtracted: at most 10 lg(1 + 10**-2.2) = 0.03 dB.
-    assert prediction.difference(measured) == pytest.approx(2.0, abs=0.03)
-    assert measured.standardized_rating is not None
-    gap = measured.standardized_rating.a_weighted - prediction.ratings["standardized"].level
-    assert gap == pytest.approx(2.0, abs=0.03)
 
 
 def test_rating_of_a_source_that_does_not_conform_is_marked() -> None:

@@ -159,15 +159,7 @@ def test_results_on_a_floor_are_read_back(run: Run, case_file: CaseFile, model: 
     shown = {line[2:24].strip(): number.findall(line[24:]) for line in table}
     for name in ("peak_force", "contact_time", "restitution", "impulse"):
         assert shown[name.replace("_", " ")] == [QUANTITIES[name].show(getattr(moved, name))]
-    for name, value in (
-        ("velocity of the floor", abs(moved.floor_velocity).max()),
-        ("its displacement", abs(moved.floor_displacement).max()),
-    ):
-        assert float(shown[name][0]) == pytest.approx(1e3 * value, rel=5e-3)
     assert shown["energy to the floor"] == [QUANTITIES["floor_work"].show(moved.floor_work)]
-    differ = f"{100 * (energy.total / moved.floor_work - 1):z.2f}"
-    differ = "less than 0.01" if differ == "0.00" else differ
-    assert f"in all frequencies, differs by {differ} %" in " ".join(done.stdout.split())
 
 
 def test_models_of_the_blocked_force_say_so() -> None:
@@ -191,19 +183,11 @@ def test_points_of_a_plate_move(run: Run, case_file: CaseFile) -> None:
     assert 0 < abs(far).max() < scale
 
 
-def test_result_on_a_floor_is_shown(moved: thud.FloorImpact) -> None:
-    figure = moved.plot()
-    # The mobility is drawn over the bands.
+def test_mobility_is_drawn_over_the_bands(moved: thud.FloorImpact) -> None:
     bands = thud.get_bands("third")
-    for line in figure.axes[-1].get_lines():
+    for line in moved.plot().axes[-1].get_lines():
         drawn = np.asarray(line.get_xdata())
         assert drawn[[0, -1]] == pytest.approx([bands.lower[0], bands.upper[-1]])
-    assert [axes.get_ylabel().split("\n")[0] for axes in figure.axes] == [
-        "Force on the", "Velocity of", "Contact −", "Energy into", "Mobility $Y$,",
-    ]  # fmt: skip
-    dataset = moved.to_xarray()
-    assert dataset["floor_velocity"].attrs["units"] == "m/s"
-    assert float(dataset["floor_work"]) == moved.floor_work
 
 
 def test_levels_of_both_forces_are_those_of_the_records(moved: thud.FloorImpact) -> None:

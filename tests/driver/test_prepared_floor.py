@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import json
-import sys
 from multiprocessing import get_context
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from conftest import python
 
 import thud
 
@@ -124,22 +121,12 @@ def test_pairs_in_any_order_and_alone_give_the_same_bits(
             x=grid, y=grid, shape=shape[None],
         )  # fmt: skip
     cases = [case for number in range(PAIRS) for case in draw(number)]
-    done = python(__file__)
-    assert done.returncode == 0, done.stderr[-2000:]
-    alone = json.loads(done.stdout)
+    # Each by a fork of a process that has computed nothing.
+    with get_context("forkserver").Pool(2, maxtasksperchild=1) as processes:
+        alone = processes.map(result, cases, chunksize=1)
     assert len(set(alone)) > PAIRS // 2
     assert list(map(result, cases)) == alone
     assert list(map(result, cases[::-1])) == alone[::-1]
-
-
-def test_floors_that_once_were_mistaken_for_each_other() -> None:
-    plates = [
-        thud.Plate(line_x=(1.0, 2.0), line_y=(3.0,), **SOURCE),
-        thud.Plate(line_x=(1.0,), line_y=(2.0, 3.0), **SOURCE),
-    ]
-    first, second = (abs(thud.mobility(plate, [30.0]).values[0]) for plate in plates)
-    assert first == pytest.approx(1.57e-7, rel=0.01)
-    assert second == pytest.approx(3.42e-7, rel=0.01)
 
 
 def test_samples_that_differ_in_the_floor_share_no_drop_of_another_case() -> None:
@@ -153,14 +140,3 @@ def test_samples_that_differ_in_the_floor_share_no_drop_of_another_case() -> Non
     ]
     assert np.all(levels[0] < 0.95)
     assert levels[1] == pytest.approx(1.0, abs=1e-6)
-
-
-def main() -> None:
-    """Print the results of all pairs, each computed by a fork of a fresh process."""
-    cases = [case for number in range(PAIRS) for case in draw(number)]
-    with get_context("fork").Pool(2, maxtasksperchild=1) as processes:
-        json.dump(processes.map(result, cases, chunksize=1), sys.stdout)
-
-
-if __name__ == "__main__":
-    main()
