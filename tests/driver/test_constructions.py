@@ -247,50 +247,44 @@ def test_inputs_of_a_clone_are_found(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert files.inputs_folder() == tmp_path / "driver/thud/inputs"
 
 
+JOISTS = thud.construction("joists, 1 board")
+DECK = thud.construction("concrete 180")
+LARGE = thud.Plate(length=7.0, width=6.0)
+
+
+def spanning(length: float) -> thud.Construction:
+    """Return joists of a stated length."""
+    floor = replace(JOISTS.floor, length=length)
+    return replace(JOISTS, floor=floor, sources={**JOISTS.sources, "length": "drawing"})
+
+
 @pytest.mark.parametrize(
-    ("floor", "room", "expected"),
+    ("entry", "floor", "room", "expected"),
     [
-        (None, {}, (5.0, 4.0)),
-        (None, {"length": 6.2, "width": 5.0}, (6.2, 5.0)),
-        (thud.Plate(length=7.0, width=6.0), {"length": 6.2, "width": 5.0}, (6.2, 5.0)),
-        *((thud.Plate(length=7.0, width=6.0), room, (7.0, 6.0)) for room in (
+        (DECK, None, {}, (5.0, 4.0)),
+        (DECK, None, {"length": 6.2, "width": 5.0}, (6.2, 5.0)),
+        (DECK, LARGE, {"length": 6.2, "width": 5.0}, (6.2, 5.0)),
+        *((DECK, LARGE, room, (7.0, 6.0)) for room in (
             {}, {"length": 6.2}, {"length": 6.2, "width": 5.0, "corner_x": 0.5})),
+        # A room never turns joists; those of a case remain as they are.
+        (JOISTS, None, {"length": 5.0, "width": 4.0}, (4.0, 5.0)),
+        (JOISTS, None, {"length": 4.5, "width": 6.0}, (4.5, 6.0)),
+        (JOISTS, None, {"length": 6.0, "width": 4.5, "corner_x": 0.0}, (4.5, 6.0)),
+        (spanning(4.8), None, {"length": 6.0, "width": 4.5}, (4.8, 6.0)),
+        (spanning(4.2), None, {"length": 6.0, "width": 4.5}, (4.2, 6.0)),
+        (JOISTS, thud.JoistFloor(length=5.0, width=4.0), {}, (5.0, 4.0)),
     ],
 )  # fmt: skip
 def test_construction_has_the_sides_of_the_case(
-    floor: thud.Plate | None, room: dict[str, float], expected: tuple[float, float]
+    entry: thud.Construction,
+    floor: thud.Plate | None,
+    room: dict[str, float],
+    expected: tuple[float, float],
 ) -> None:
-    case = thud.construction("concrete 180").case(thud.Case(floor=floor, room=thud.Room(**room)))  # type: ignore[arg-type]
-    assert isinstance(case.floor, thud.Plate)
+    case = entry.case(thud.Case(floor=floor, room=thud.Room(**room)))  # type: ignore[arg-type]
     thud.case.case.check_case(case)
+    assert isinstance(case.floor, thud.Plate | thud.JoistFloor)
     assert (case.floor.length, case.floor.width) == expected
-
-
-@pytest.mark.parametrize(
-    ("span", "room", "expected"),
-    [
-        ("", {"length": 5.0, "width": 4.0}, (4.0, 5.0)),
-        ("", {"length": 4.5, "width": 6.0}, (4.5, 6.0)),
-        ("", {"length": 6.0, "width": 4.5, "corner_x": 0.0}, (4.5, 6.0)),
-        ("4.8", {"length": 6.0, "width": 4.5}, (4.8, 6.0)),
-        ("4.2", {"length": 6.0, "width": 4.5}, (4.2, 6.0)),
-    ],
-)
-def test_room_never_turns_joists(
-    span: str, room: dict[str, float], expected: tuple[float, float], tmp_path: Path
-) -> None:
-    text = (REPOSITORY / "inputs/constructions/joists_1.toml").read_text(encoding="utf-8")
-    stated = f'[keys]\nlength = {{ value = {span}, source = "drawing" }}\n' if span else "[keys]\n"
-    path = tmp_path / "joists.toml"
-    path.write_text(re.sub(r"\[keys\].*\n", stated, text))
-    case = thud.construction(path).case(thud.Case(room=thud.Room(**room)))  # type: ignore[arg-type]
-    assert isinstance(case.floor, thud.JoistFloor)
-    assert (case.floor.length, case.floor.width) == expected
-    # Joists of a case remain as they are.
-    other = thud.Case(floor=thud.JoistFloor(length=5.0, width=4.0), room=thud.Room())
-    floor = thud.construction("joists, 2 boards").case(other).floor
-    assert isinstance(floor, thud.JoistFloor)
-    assert (floor.length, floor.width) == (5.0, 4.0)
 
 
 def test_prediction_on_a_construction_has_its_floor_and_the_sides_of_the_case() -> None:
