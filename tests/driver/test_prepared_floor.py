@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from multiprocessing import get_context
 from typing import TYPE_CHECKING, Any
 
@@ -9,100 +10,69 @@ import numpy as np
 import pytest
 
 import thud
+from thud.base._schema import KEYS
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-# Name and keys of a floor, name and keys of a model.
-Chosen = tuple[str, dict[str, Any], str, dict[str, Any]]
+    from thud.base._schema import FloorOptions, ModelOptions
+    from thud.base.key import Key
+
+    Chosen = tuple[FloorOptions, ModelOptions]
 
 PAIRS = 12
 FREQUENCIES = [30.0, 80.0, 200.0]
 SOURCE = {"source_x": 0.31, "source_y": 0.22}
-# Near-equal floors and models: round positions and counts, digits, lengths, keys without effect.
-# Small and thick ones have few functions.
-FLOORS: dict[str, tuple[Any, dict[str, list[Any]]]] = {
-    "plate": (thud.Plate, {
-        "line_x": [(), (1.0,), (2.0,), (1.0, 2.0)],
-        "line_y": [(), (1.0,), (2.0,), (1.0, 2.0)],
-        "length": [3.0, 3.000001, 2.5],
-        "width": [2.5, 3.0],
-        "thickness": [0.5],
-        "support": ["simple", "clamped"],
-        "screed_thickness": [0.0, 0.5],
-        "layer_stiffness": [1e7, 1e7 * (1 + 1e-12)],
-        "subceiling_thickness": [0.0, 0.2],
-    }),
-    "joist_floor": (thud.JoistFloor, {
-        "line_x": [(), (1.0,)],
-        "length": [2.0, 2.5],
-        "width": [2.0],
-        "spacing": [0.6],
-        "sheathing_thickness": [0.1],
-    }),
-    "laminate_floor": (thud.LaminateFloor, {
-        "line_y": [(), (1.0,)],
-        "length": [2.0, 2.5],
-        "width": [2.0],
-        "layer_thickness": [(0.2, 0.2)],
-    }),
-    "modal_floor": (thud.ModalFloor, {
-        "file": ["modes_1.csv", "modes_2.csv"],
-        "residual_compliance": [0.0, 1e-9],
-        "thickness": [0.0, 0.2],
-    }),
-    "oscillator": (thud.Oscillator, {"mass": [100.0, 100.0 + 1e-9], "stiffness": [2e6, 2.1e6]}),
-    "infinite_plate": (thud.InfinitePlate, {"resistance": [1600.0, 1600.0 * (1 + 1e-12)]}),
-    "measured_mobility": (thud.MeasuredMobility, {
-        "direct": [1e-4],
-        "pole_frequency": [(60.0,), (60.0 + 1e-9,)],
-        "damping_ratio": [(0.05,)],
-        "residue_real": [(0.02,), (0.021,)],
-        "residue_imaginary": [(0.0,)],
-    }),
-}  # fmt: skip
-AT_A_POINT = "oscillator", "infinite_plate", "measured_mobility"
-MODELS: dict[str, tuple[Any, dict[str, list[Any]]]] = {
-    "hollow_sphere": (thud.HollowSphere, {"momentum_flux": ["momentum_balance", "retarding"]}),
-    "hunt_crossley": (thud.HuntCrossley, {"contact_time": [0.02], "exponent": [1.0, 1.5]}),
-    "two_mass": (thud.TwoMass, {}),
-    "measured_modes": (thud.MeasuredModes, {
-        "frequency": [(24.0, 89.0), (24.0, 89.0 + 1e-9)],
-        "damping_ratio": [(0.1, 0.1), (0.1, 0.11)],
-        "effective_mass": [(2.0, 0.5)],
-    }),
-    "modal_ball": (thud.ModalBall, {"rings": [0, 20], "damping_law": ["constant", "fractional"]}),
-    "finite_element": (thud.FiniteElement, {
-        "radial_elements": [2],
-        "polar_elements": [16, 18],
-        "viscosity": ["none", "kelvin_voigt"],
-    }),
-}  # fmt: skip
+# Small and thick floors have few functions.
+FLOORS: list[FloorOptions] = [
+    *[thud.Plate(length=2.5, width=2.5, thickness=0.5, **SOURCE)] * 3,
+    thud.Plate(length=2.5, width=3.0, screed_thickness=0.5, subceiling_thickness=0.2, **SOURCE),
+    thud.JoistFloor(length=2.0, width=2.0, spacing=0.6, sheathing_thickness=0.1, **SOURCE),
+    thud.LaminateFloor(length=2.0, width=2.0, layer_thickness=(0.2, 0.2), **SOURCE),
+    thud.ModalFloor(file="modes_1.csv", thickness=0.2, **SOURCE),
+    thud.Oscillator(),
+    thud.InfinitePlate(1600.0),
+    thud.MeasuredMobility(1e-4, [60.0], [0.05], [0.02], [0.0]),
+]
+MODELS: list[ModelOptions] = [
+    thud.HollowSphere(), thud.HuntCrossley(contact_time=0.02), thud.TwoMass(), thud.ModalBall(),
+    thud.MeasuredModes([24.0, 89.0], [0.1, 0.1], [2.0, 0.5]),
+    thud.FiniteElement(radial_elements=2, polar_elements=16),
+]  # fmt: skip
+
+
+def changed(options: Any, key: Key, rng: np.random.Generator) -> Any:  # noqa: ANN401 - options
+    """Return options of which a key has another value: near-equal, of a choice, or in a list."""
+    value = getattr(options, key.name)
+    factor = rng.choice([1 - 1e-12, 0.9])
+    if key.name == "file":
+        value = "modes_2.csv"
+    elif key.kind == "list":
+        value = tuple(factor * x for x in value) or (1.0,)
+    elif key.kind in {"real", "whole"}:
+        value = value + 2 if key.whole else value * factor
+    elif key.choices:
+        value = str(rng.choice(key.choices))
+    return replace(options, **{key.name: value})
 
 
 def draw(number: int) -> list[Chosen]:
-    """Return a pair of cases that differ in a few keys."""
+    """Return a pair of cases that differ in up to two keys of the floor."""
     rng = np.random.default_rng(number)
-
-    def choose(keys: dict[str, list[Any]]) -> dict[str, Any]:
-        return {key: values[rng.integers(len(values))] for key, values in keys.items()}
-
-    floor = str(rng.choice(list(FLOORS), p=[0.4] + [0.1] * 6))
-    model = str(rng.choice(list(MODELS)))
-    first = choose(FLOORS[floor][1])
-    changed = rng.choice(list(first), size=min(2, len(first)), replace=False)
-    second = {**first, **{key: choose(FLOORS[floor][1])[key] for key in changed}}
-    return [(floor, keys, model, choose(MODELS[model][1])) for keys in (first, second)]
+    floor, model = (options[rng.integers(len(options))] for options in (FLOORS, MODELS))  # type: ignore[arg-type]
+    keys = [key for key in KEYS if key.owner == floor.name and hasattr(floor, key.name)]
+    other = floor
+    for index in rng.choice(len(keys), size=min(2, len(keys)), replace=False):
+        other = changed(other, keys[index], rng)
+    return [(floor, model), (other, model)]
 
 
 def result(case: Chosen) -> str:
     """Return the mobility of a floor and the force of a drop on it, bit for bit; or the refusal."""
-    floor, keys, model, options = case
-    position = {} if floor in AT_A_POINT else SOURCE
+    floor, model = case
     try:
-        built = FLOORS[floor][0](**keys, **position)
-        mobility = thud.mobility(built, FREQUENCIES).values
-        impact = thud.solve(thud.Case(model=MODELS[model][0](**options), floor=built))
+        mobility = thud.mobility(floor, FREQUENCIES).values
+        impact = thud.solve(thud.Case(model=model, floor=floor))
     except thud.ThudError as error:
         return str(error)
     force = impact.on_floor.floor_force if impact.on_floor else impact.floor_force
