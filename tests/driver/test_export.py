@@ -59,10 +59,13 @@ def test_files_hold_the_force_to_their_last_digit(kind: str, digits: float, tmp_
 
 
 def test_files_tell_units_rate_kind_and_checksum(tmp_path: Path) -> None:
+    """Words of others stay in their lines."""
     thud.write_case(IMPACT.case, tmp_path / "case.nml")
     checksum = hashlib.sha256((tmp_path / "case.nml").read_bytes()).hexdigest()
+    note = Note("sign_stated", others={"polarity": "a\r\nb"})
+    force = replace(FORCE, name="b\udcffll", origin="first\nsecond,3", notes=(note,))
     for kind, (ending, _) in EXPORTS.items():
-        FORCE.save(tmp_path / f"force{ending}")
+        force.save(tmp_path / f"force{ending}")
         text = (tmp_path / f"force{ending}").read_bytes()
         if kind == "mat":
             text = "\n".join(np.ravel(loadmat(tmp_path / "force.mat")["about"])).encode()
@@ -70,6 +73,8 @@ def test_files_tell_units_rate_kind_and_checksum(tmp_path: Path) -> None:
             assert word.encode() in text, f"{kind}: {word}"
         # The power of two above the peak.
         assert (b"Scale: 2048 N per full scale" in text) == (kind == "wav")
+    (signal,) = opened(tmp_path / "force.csv")
+    assert np.array_equal(signal.read(0, signal.n_sample), FORCE.force)
 
 
 @pytest.mark.parametrize("start", [0.0, -3e-3])
@@ -107,15 +112,6 @@ def test_force_is_that_which_the_case_judges() -> None:
     assert np.array_equal(blocked_force(impact).force, impact.elastic_force)
     assert np.array_equal(FORCE.force, IMPACT.floor_force)
     assert "elastic" in blocked_force(impact).header_lines()[0]
-
-
-def test_words_of_others_stay_in_their_lines(tmp_path: Path) -> None:
-    note = Note("sign_stated", others={"polarity": "a\r\nb"})
-    force = replace(FORCE, name="b\udcffll", origin="first\nsecond,3", notes=(note,))
-    for ending, _ in EXPORTS.values():
-        force.save(tmp_path / f"force{ending}")
-    (signal,) = opened(tmp_path / "force.csv")
-    assert np.array_equal(signal.read(0, signal.n_sample), FORCE.force)
 
 
 @pytest.fixture

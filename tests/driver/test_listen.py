@@ -150,11 +150,8 @@ def test_floors_follow_each_other_at_one_scale(
     assert peak < found.full_scale <= 2.5 * peak
     assert thud.listen(predictions["concrete"]).full_scale < found.full_scale
     assert found.rows()[1][:2] == ("0.00", "concrete")
-    assert all(name in repr(found) for name in FLOORS)
-    assert "concrete" in repr(first)
-    assert [f.pressure.tolist() for f in thud.listen(predictions).sounds] == [
-        first.pressure.tolist(), second.pressure.tolist()
-    ]  # fmt: skip
+    for again, sound in zip(thud.listen(predictions).sounds, found.sounds, strict=True):
+        assert (again.pressure == sound.pressure).all()
     other = thud.listen(predictions, seed=1).sounds[0]
     assert (other.pressure != first.pressure).any()
 
