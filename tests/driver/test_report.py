@@ -45,7 +45,7 @@ from thud.report.contents import (
     report_criteria,
     report_data,
 )
-from thud.report.page import BUDGET_HEAD, range_picture, report_page
+from thud.report.page import range_picture, report_page
 from thud.report.pdf import html_to_pdf, missing_characters
 from thud.report.recording_files import file_names, read_picture, verdict_text, write_report
 from thud.report.rows import criterion_row, drop_table, freedom_text, risk_text
@@ -315,12 +315,6 @@ def open_pdf(path: Path) -> Any:  # noqa: ANN401 - of pypdfium2
     return pdfium.PdfDocument(path)
 
 
-def text_of(path: Path) -> str:
-    """Return the text of a PDF without blanks."""
-    texts = (page.get_textpage().get_text_bounded() for page in open_pdf(path))
-    return re.sub(r"\s", "", "".join(texts))
-
-
 def data_of(recording: Recording) -> dict[str, Any]:
     """Return the content of ``report.json``."""
     data: dict[str, Any] = json.loads(json_bytes(report_data(recording)))
@@ -361,19 +355,6 @@ def test_signature_is_on_a_page_with_the_last_notes(one: Recording, tmp_path: Pa
         assert "Signature" in pages[-1]
         counts.add(len(pages))
     assert counts == {2, 3}
-
-
-@pytest.mark.slow
-def test_browser_prints_the_same_page(written: tuple[Recording, Path], tmp_path: Path) -> None:
-    _, folder = written
-    printed = tmp_path / "printed.pdf"
-    with open_in_browser(tmp_path / "page.html", (folder / "report.html").read_text()) as page:
-        page.pdf(path=printed, prefer_css_page_size=True)
-    # The table of budgets repeats its head where it breaks, which engines do at other rows.
-    head = "".join(BUDGET_HEAD).replace(" ", "")
-    words = [text_of(path).replace(head, "") for path in (folder / "report.pdf", printed)]
-    # Figures are laid out letter by letter; the order of their words may differ.
-    assert sorted(words[0]) == sorted(words[1])
 
 
 def test_texts_do_not_overlap_and_stay_on_the_page(written: tuple[Recording, Path]) -> None:
@@ -427,16 +408,15 @@ def test_data_are_those_of_the_recording(written: tuple[Recording, Path]) -> Non
         assert ("noise" in names, "repeatability" in names) == (True, len(recording.drops) > 1)
 
 
-@pytest.mark.parametrize(
-    "text",
-    ["2024-05-03", "2024-05-03T10:11:12.123456Z", "03.05.2024 10:11", "2024/05/03",
-     "03-MAY-24   10:11:12"],
-)  # fmt: skip
-def test_dates_of_many_kinds_are_read(text: str) -> None:
-    found = read_date(text)
-    assert found is not None
-    assert found.date().isoformat() == "2024-05-03"
+def test_dates_of_many_kinds_are_read() -> None:
     assert read_date("3/5/24") is None
+    for text in (
+        "2024-05-03", "2024-05-03T10:11:12.123456Z", "03.05.2024 10:11", "2024/05/03",
+        "03-MAY-24   10:11:12",
+    ):  # fmt: skip
+        found = read_date(text)
+        assert found is not None, text
+        assert found.date().isoformat() == "2024-05-03"
 
 
 @pytest.mark.parametrize("library", [None, "raise OSError('no libpango')"])
