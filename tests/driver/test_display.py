@@ -185,17 +185,16 @@ def test_results_are_drawn(example: tuple[Displayed, str]) -> None:
         assert len(legend.get_texts()) > 1 or legend.get_title().get_text()
 
 
-def test_texts_name_verdicts_and_numbers(flagship: thud.Impact) -> None:
-    """Of a verdict what causes it, of many drops how many conform and failed."""
+def test_lines_name_what_causes_a_verdict_and_how_many_fail(flagship: thud.Impact) -> None:
     shell = impact().assess()
     causes = [entry.name for entry in shell.criteria if entry.conforms != "conforms"]
     assert len(causes) == 3
     assert all(name in repr(shell) for name in causes)
     assert "octave" not in repr(flagship.assess())
-    assert shell.rows()[-1][-1] == "does not conform"
-    many = thud.solve_many({"mass": [2.0, -1.0, -2.0]})
-    numbers = {"0 conform": True, "2 failed": True, "not assessed": False}
-    assert {text: text in repr(many) for text in numbers} == numbers
+    many = repr(thud.solve_many({"mass": [2.0, -1.0, -2.0]}))
+    assert {text: text in many for text in ("0 conform", "2 failed", "not assessed")} == {
+        "0 conform": True, "2 failed": True, "not assessed": False,
+    }  # fmt: skip
     assert "not assessed" in repr(thud.solve_many({"mass": [2.4]}, levels=False))
 
 

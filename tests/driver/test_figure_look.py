@@ -189,21 +189,6 @@ def test_users_style_changes_no_figure(shell: thud.Impact, tmp_path: Path) -> No
         assert plain == other, name
 
 
-def test_run_beside_a_matplotlibrc_draws_the_same_figures(tmp_path: Path) -> None:
-    drawn = []
-    for folder, style in (("plain", {}), ("other", OTHER_STYLE | {"backend": "nowhere"})):
-        (tmp_path / folder).mkdir()
-        (tmp_path / folder / "case.nml").write_text(MINIMAL)
-        lines = "".join(f"{key}: {value}\n" for key, value in style.items())
-        (tmp_path / folder / "matplotlibrc").write_text(lines)
-        command = ["-P", "-m", "thud", "run", "-q", "case.nml", "-o", "out"]
-        done = python(*command, cwd=tmp_path / folder)
-        assert done.returncode == 0, done.stderr
-        assert "Traceback" not in done.stderr
-        drawn.append((tmp_path / folder / "out/force.svg").read_bytes())
-    assert drawn[0] == drawn[1]
-
-
 @pytest.mark.parametrize("words", [["run", "case.nml"], ["measure", "record.csv"]])
 def test_commands_without_a_matplotlib_that_works_keep_the_results(
     words: list[str], tmp_path: Path
@@ -238,12 +223,6 @@ def test_every_figure_is_drawn_in_its_own_style() -> None:
 
 
 INPUT = REPOSITORY / "inputs"
-SWEEP = '[parameters]\nheight = {values = [0.5, 1.0], unit = "m"}\n'
-FIT = "[target]\nlevels = [39, 31, 23, 17, 12]\n[parameters]\nyoungs_modulus = {}\n"
-RESPONSE = (
-    "frequency,real,imaginary\n10,1e-5,1e-5\n20,2e-5,0\n30,1.5e-5,-5e-6\n40,1e-5,-1e-5\n"
-    "80,5e-6,-5e-6\n"
-)
 
 
 @pytest.mark.parametrize(
@@ -254,9 +233,6 @@ RESPONSE = (
         ("measure {}/recordings/drop_1.csv", {"levels.csv", "report.json", "report.html"}),
         ("floor {0}/floors/joists.nml {0}/floors/concrete_140.nml", {"floors.html"}),
         ("rate {}/floors/field_levels.csv", set()),
-        ("mobility response.csv", set()),
-        ("sweep sweep.toml", {"sweep.nc"}),
-        ("fit fit.toml", {"fit.json"}),
     ],
 )
 @pytest.mark.slow
@@ -273,8 +249,6 @@ def test_figure_that_fails_is_a_warning(
 
     monkeypatch.setattr(Figure, "savefig", fail)
     monkeypatch.chdir(tmp_path)
-    for name, text in (("sweep.toml", SWEEP), ("fit.toml", FIT), ("response.csv", RESPONSE)):
-        Path(name).write_text(text)
     assert cli.main([*command.format(INPUT).split(), "-q", "-o", "out"]) == 0
     printed = [line for line in capsys.readouterr().err.splitlines() if "not drawn" in line]
     assert printed

@@ -201,7 +201,13 @@ def test_plate_takes_over_above_the_highest_mode(path: Path) -> None:
     assert fewer.level[: fewer.n_modal] == pytest.approx(exact.level[: fewer.n_modal], abs=0.5)
 
 
-def test_without_a_plate_nothing_stands_for_higher_modes(path: Path) -> None:
+def test_coarse_grid_is_refused_and_nothing_stands_for_higher_modes(path: Path) -> None:
+    # The eighth half-wave of the highest mode has 2.25 spacings of a grid of 19 points.
+    slab(800, *grid(16, 17)).write(path)
+    with pytest.raises(
+        thud.InputError, match=naming("too coarse", "along x", "four grid spacings")
+    ):
+        thud.mobility(FLOOR, [30.0])
     slab(330, *grid(15, 13)).write(path)
     with pytest.raises(thud.InputError, match=naming("modal_floor", "thickness", "density")):
         thud.predict_level(floor=BARE, room=ROOM)
@@ -283,17 +289,3 @@ def test_long_rows_fill_no_stack_of_a_thread_and_leave_no_file_open(path: Path) 
     finally:
         threading.stack_size(before)
     assert len(names_in(Path("/dev/fd"))) == open_files
-
-
-def test_coarse_grid_and_a_quarter_of_the_modes_are_refused(path: Path) -> None:
-    modes = slab(800, *grid(21, 17))
-    # Every fourth mode, as of a quarter with symmetric edges.
-    Modes(*(part[::4] for part in modes[:2]), *modes[2:4], modes.shape[::4]).write(path)
-    with pytest.raises(thud.InputError, match=naming(9, "modes up to", "all modes")):
-        thud.solve(floor=FLOOR)
-    # The eighth half-wave of the highest mode has 2.25 spacings of a grid of 19 points.
-    slab(800, *grid(16, 17)).write(path)
-    with pytest.raises(
-        thud.InputError, match=naming("too coarse", "along x", "four grid spacings")
-    ):
-        thud.mobility(FLOOR, [30.0])
