@@ -10,6 +10,7 @@ import re
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -32,7 +33,7 @@ TABLES = [
 DECK = "concrete 180, screed on 15 MN/m3, ceiling"
 
 
-def predicted(name: str = DECK, **room: float) -> PredictedFloor:
+def predicted(name: str = DECK, **room: Any) -> PredictedFloor:  # noqa: ANN401 - of any key
     """Return a construction and its prediction."""
     entry = thud.construction(name)
     case = entry.case(thud.Case(room=thud.Room(**room)))  # type: ignore[arg-type]
@@ -42,7 +43,7 @@ def predicted(name: str = DECK, **room: float) -> PredictedFloor:
 @pytest.fixture(scope="module")
 def floor() -> PredictedFloor:
     """Return the prediction of a construction with all kinds of layers, and a requirement."""
-    return predicted(volume=40.0, required=49.0)
+    return predicted(volume=40.0, required=49.0, wall_lengths=(5.0, 4.0))
 
 
 def text_of(floor: PredictedFloor) -> str:
@@ -97,14 +98,10 @@ def test_tables_have_the_numbers_of_the_prediction(floor: PredictedFloor, tmp_pa
     assert np.hypot.reduce(parts) == pytest.approx(prediction.rating.uncertainty)
 
 
-def test_fractions_of_the_paths_are_stated(tmp_path: Path) -> None:
+def test_fractions_of_the_paths_are_stated(floor: PredictedFloor, tmp_path: Path) -> None:
     """The A-weighted fractions are means of those of the bands, weighted by their energies."""
-    room = thud.Room(wall_lengths=(5.0, 4.0))
-    prediction = thud.predict_level(floor=thud.Plate(), room=room)
-    floor = PredictedFloor("walls", "walls", prediction)
-    shares = prediction.weighted_shares
+    shares, bands = floor.prediction.weighted_shares, floor.prediction.path_shares
     assert shares.sum() == pytest.approx(1.0)
-    bands = prediction.path_shares
     assert (shares > bands.min(axis=0)).all()
     assert (shares < bands.max(axis=0)).all()
     text = f"floor {100 * shares[0]:.0f} %, wall 1 (5 m) {100 * shares[1]:.0f} %"
@@ -304,24 +301,20 @@ def test_names_of_cases_stay_in_the_directory(name: str, tmp_path: Path) -> None
     assert {*tmp_path.iterdir()} <= {*before, out}
 
 
-def test_source_that_does_not_conform_is_beside_the_rating() -> None:
-    case = thud.Case(floor=thud.Plate(), room=thud.Room(volume=66.092), drop=thud.Drop(height=0.1))
-    floor = PredictedFloor("low", "low", thud.predict_level(thud.solve(case)))
+def test_source_that_does_not_conform_is_beside_the_rating_and_digits_are_few() -> None:
+    case = thud.Case(
+        floor=thud.Plate(screed_thickness=0.05, layer_stiffness=6e6, covering_stiffness=1e5),
+        room=thud.Room(volume=66.092, reverberation_time=0.05), drop=thud.Drop(height=0.1),
+    )  # fmt: skip
+    prediction = thud.predict_level(thud.solve(case))
+    floor = PredictedFloor("low", "low", prediction)
     note = "the source does not conform"
     assert note in " ".join(screen_text(floor).split())
     page = floor_page(floor, b"", b"")
-    box = page.partition('class="verdict">')[2].partition("</div>")[0]
-    assert note.capitalize() in box
-
-
-def test_numbers_of_the_report_have_no_exponent_and_few_digits() -> None:
-    plate = thud.Plate(screed_thickness=0.05, layer_stiffness=6e6, covering_stiffness=1e5)
-    prediction = thud.predict_level(
-        floor=plate, room=thud.Room(volume=66.092, reverberation_time=0.05)
-    )
-    floor = PredictedFloor("soft", "soft", prediction)
+    assert note.capitalize() in page.partition('class="verdict">')[2].partition("</div>")[0]
     text = text_of(floor)
     assert "66.1 m³" in text
+    # No exponents.
     assert not re.search(r"\d+e[-+−]\d", text)
     assert not re.search(r"\de[-+−]\d", str(band_rows(floor)))
     for value, row in zip(prediction.energy, band_rows(floor)[1:], strict=True):
