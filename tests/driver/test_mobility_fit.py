@@ -174,14 +174,14 @@ def test_orders_that_fail_are_passed_over(monkeypatch: pytest.MonkeyPatch) -> No
 
     def fails(measured: thud.Mobility, order: int) -> thud.MobilityFit:
         if order != 2 * len(MODES):
-            message = "no fit"
+            message = f"order {order} fails"
             raise thud.NumericalError(message)
         return usual(measured, order)
 
     monkeypatch.setattr(mobility_fit, "_fit", fails)
     assert thud.fit_mobility(thud.Mobility(FREQUENCY, MOBILITY)).error < 1e-6
     monkeypatch.setattr(mobility_fit, "_ORDERS", (2, 4))
-    with pytest.raises(thud.NumericalError, match=naming("measurement", "no fit")):
+    with pytest.raises(thud.NumericalError, match=naming("measurement", "order 2 fails")):
         thud.fit_mobility(thud.Mobility(FREQUENCY, MOBILITY))
 
 
@@ -312,6 +312,7 @@ def test_fits_that_miss_raise_a_warning(
 ) -> None:
     found = replace(scaled_fit(exact, np.full(300, factor)), free_error=free_error)
     assert codes(found.notes) == [code] * bool(code)
+    assert [note.value for note in found.notes] == pytest.approx([100 * found.error] * bool(code))
 
 
 def choose(
