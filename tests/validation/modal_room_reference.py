@@ -14,12 +14,9 @@ import numpy as np
 from scipy.signal import lfilter
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from numpy.typing import ArrayLike, NDArray
 
     Array = NDArray[np.float64]
-    ComplexArray = NDArray[np.complex128]
 
 REFERENCE_PRESSURE = 2e-5
 FAST = 0.125
@@ -29,28 +26,18 @@ AIR_DENSITY, SOUND_SPEED = 1.2, 343.0
 def modal_rate(inputs: ArrayLike, omega: float, decay: float, sample_rate: float) -> Array:
     """Return X' of X'' + 2 decay X' + omega**2 X = input, from rest, exact for linear pieces.
 
-    `decay` is the rate of the amplitude, 1/s, below omega unless omega is 0; the samples are along
-    the first axis.
+    `decay` is the rate of the amplitude, 1/s, below omega unless omega is 0; shape (n_time,).
     """
     inputs = np.asarray(inputs, float)
     h = 1 / sample_rate
-    if omega > 0 and not decay < omega:
-        message = f"overdamped mode: {decay} 1/s of {omega} rad/s"
-        raise ValueError(message)
     # z' = s z + input, with X' = Im(s z)/omega_d; without stiffness X' = z of s = -2 decay.
     damped = math.sqrt(omega**2 - decay**2) if omega > 0 else 0.0
     s = complex(-decay, damped) if omega > 0 else complex(-2 * decay)
     before, after = _linear_step(s * h)
-    z = lfilter([h * after, h * before], [1, -np.exp(s * h)], inputs, axis=0)
+    z = lfilter([h * after, h * before], [1, -np.exp(s * h)], inputs)
     # The first sample has no piece before it.
-    z = z - h * after * inputs[0] * _powers(np.exp(s * h), z)
+    z = z - h * after * inputs[0] * np.exp(s * h * np.arange(len(z)))
     return np.asarray((s * z).imag / damped if omega > 0 else z.real)
-
-
-def _powers(factor: complex, like: ComplexArray) -> ComplexArray:
-    """Return factor**0, factor**1, ... along the first axis."""
-    powers = factor ** np.arange(len(like))
-    return powers.reshape(-1, *[1] * (like.ndim - 1))
 
 
 def _linear_step(x: complex) -> tuple[complex, complex]:
@@ -77,44 +64,13 @@ def get_room_modes(
     return orders[order].astype(float), frequency[order]
 
 
-def get_plate_velocity(
-    force: ArrayLike,
-    sample_rate: float,
-    frequency: ArrayLike,
-    loss_factor: ArrayLike,
-    drive: ArrayLike,
-) -> Array:
-    """Return modal velocities of a struck plate, m/s, shape (n_time, n_mode).
-
-    Parameters
-    ----------
-    force
-        Force, N, linear between samples, shape (n_time,).
-    sample_rate
-        Hz.
-    frequency, loss_factor
-        Natural frequencies, Hz, and loss factors: a dashpot of the decay rate omega eta/2.
-    drive
-        Mode shapes at the force over their modal masses, 1/kg.
-    """
-    omega = 2 * np.pi * np.asarray(frequency, float)
-    loss = np.broadcast_to(loss_factor, omega.shape)
-    return np.stack(
-        [
-            modal_rate(np.asarray(force) * d, w, w * eta / 2, sample_rate)
-            for w, eta, d in zip(omega, loss, np.asarray(drive), strict=True)
-        ],
-        axis=1,
-    )
-
-
 def get_pressure(  # noqa: PLR0913, PLR0917 - a plate, a room, and positions
     velocity: ArrayLike,
     shapes: ArrayLike,
     sample_rate: float,
     size: ArrayLike,
     microphones: ArrayLike,
-    reverberation_time: float | Callable[[Array], ArrayLike],
+    reverberation_time: float,
     *,
     maximum: float = 700.0,
     air_density: float = AIR_DENSITY,
@@ -136,7 +92,7 @@ def get_pressure(  # noqa: PLR0913, PLR0917 - a plate, a room, and positions
     microphones
         Positions, m, shape (n_microphone, 3).
     reverberation_time
-        In s, of all modes, or a function of their frequencies.
+        In s, of all modes.
     maximum
         Highest natural frequency, Hz.
     air_density, sound_speed
@@ -144,8 +100,7 @@ def get_pressure(  # noqa: PLR0913, PLR0917 - a plate, a room, and positions
     """
     size, shapes = np.asarray(size, float), np.asarray(shapes, float)
     orders, frequency = get_room_modes(size, maximum, sound_speed)
-    times = reverberation_time(frequency) if callable(reverberation_time) else reverberation_time
-    decay = np.broadcast_to(3 * math.log(10) / np.asarray(times, float), frequency.shape)
+    decay = 3 * math.log(10) / reverberation_time
     cosines = [
         np.cos(np.pi * np.outer(orders[:, axis], (np.arange(n) + 0.5) / n))
         for axis, n in enumerate(shapes.shape[1:])
@@ -159,45 +114,31 @@ def get_pressure(  # noqa: PLR0913, PLR0917 - a plate, a room, and positions
     result = np.zeros((len(np.asarray(velocity)), len(heard)))
     for i, f in enumerate(frequency):
         source = np.asarray(velocity) @ (stiffness[i] * flow[i])
-        result += np.outer(modal_rate(source, 2 * np.pi * f, decay[i], sample_rate), heard[:, i])
+        result += np.outer(modal_rate(source, 2 * np.pi * f, decay, sample_rate), heard[:, i])
     return result
 
 
-def get_band_response(frequency: ArrayLike, nominal: float) -> ComplexArray:
-    """Return the response of a one-third-octave filter: Butterworth, three poles, base ten."""
-    center = 10 ** (round(10 * math.log10(nominal)) / 10)
-    width = 10**0.05 - 10**-0.05
-    f = np.asarray(frequency, float)
-    safe = np.where(f > 0, f, 1.0)
-    x = 1j * (safe / center - center / safe) / width
-    return np.asarray(np.where(f > 0, 1 / ((1 + x) * (1 + x + x**2)), 0))
-
-
-def filter_band(pressure: ArrayLike, sample_rate: float, nominal: float) -> Array:
-    """Return a record in a one-third-octave band, of the same shape; time is the first axis.
+def filter_band(pressure: Array, sample_rate: float, nominal: float) -> Array:
+    """Return a record in a one-third-octave band: Butterworth, three poles, base ten.
 
     Zeros of the length of the record, and of one second at least, precede the period's end.
     """
-    pressure = np.asarray(pressure, float)
     count = len(pressure) + max(len(pressure), math.ceil(sample_rate))
-    response = get_band_response(np.fft.rfftfreq(count, 1 / sample_rate), nominal)
+    center = 10 ** (round(10 * math.log10(nominal)) / 10)
+    f = np.fft.rfftfreq(count, 1 / sample_rate)[1:, None]
+    x = 1j * (f / center - center / f) / (10**0.05 - 10**-0.05)
     spectrum = np.fft.rfft(pressure, count, axis=0)
-    response = response.reshape(-1, *[1] * (pressure.ndim - 1))
-    return np.fft.irfft(spectrum * response, count, axis=0)[: len(pressure)]
+    spectrum[0] = 0
+    spectrum[1:] /= (1 + x) * (1 + x + x**2)
+    return np.asarray(np.fft.irfft(spectrum, count, axis=0)[: len(pressure)])
 
 
-def detect_fast(pressure: ArrayLike, sample_rate: float) -> Array:
-    """Return the mean square with the time weighting Fast, Pa2, along the first axis."""
-    square = np.asarray(pressure, float) ** 2
+def get_maximum_levels(pressure: Array, sample_rate: float, nominal: ArrayLike) -> Array:
+    """Return the maximum Fast levels in bands, dB, shape (n_band, n_microphone)."""
     x = -1 / (FAST * sample_rate)
     before, after = (float(value.real) * -x for value in map(complex, _linear_step(x)))
-    return np.asarray(lfilter([after, before], [1, -math.exp(x)], square, axis=0))
-
-
-def get_maximum_levels(pressure: ArrayLike, sample_rate: float, nominal: ArrayLike) -> Array:
-    """Return the maximum Fast levels in bands, dB, shape (n_band, ...)."""
-    maxima = [
-        detect_fast(filter_band(pressure, sample_rate, float(f)), sample_rate).max(axis=0)
-        for f in np.atleast_1d(nominal)
-    ]
+    maxima = []
+    for f in np.atleast_1d(nominal):
+        square = filter_band(pressure, sample_rate, float(f)) ** 2
+        maxima.append(lfilter([after, before], [1, -math.exp(x)], square, axis=0).max(axis=0))
     return np.asarray(10 * np.log10(np.array(maxima) / REFERENCE_PRESSURE**2))

@@ -1,8 +1,8 @@
-"""Finite elements of thin orthotropic plates with ribs, springs and a second plate on a layer.
+"""Finite elements of thin orthotropic plates with joists, springs and a second plate on a layer.
 
-Conforming bicubic Hermite elements (Bogner, Fox and Schmit 1965): each node has w, w_x, w_y, w_xy.
-On a rectangular grid, their matrices are Kronecker products of those of Hermite cubics along x and
-y. A stiffness is multiplied by 1 + i times the loss factor of its component.
+Conforming bicubic Hermite elements (Bogner, Fox and Schmit 1965): on a rectangular grid, their
+matrices are Kronecker products of those of scikit-fem's Hermite cubics along x and y. A stiffness
+is multiplied by 1 + i times the loss factor of its component.
 """
 
 from __future__ import annotations
@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy import sparse
+from scipy.linalg import khatri_rao
 from scipy.sparse.linalg import eigsh, splu
+from skfem import Basis, ElementLineHermite, ElementLineP2, MeshLine
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -24,29 +26,16 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     ComplexArray = NDArray[np.complex128]
 
-# Gauss points of an element: products of two cubics have degree six.
-POINTS = 4
-INFINITE = math.inf
-
 
 @dataclass(frozen=True)
 class Edge:
-    """Springs along an edge; infinite ones hold the edge exactly.
-
-    Attributes
-    ----------
-    translation, rotation : float
-        Stiffness per length against w, N/m2, and against the slope across the edge, N.
-    loss_factor : float
-        Loss factor of both.
-    """
+    """Springs along an edge against w, N/m2, and the slope across it, N; infinite ones hold it."""
 
     translation: float = 0.0
     rotation: float = 0.0
-    loss_factor: float = 0.0
 
 
-FREE, SUPPORTED, CLAMPED = Edge(), Edge(INFINITE), Edge(INFINITE, INFINITE)
+FREE, SUPPORTED, CLAMPED = Edge(), Edge(math.inf), Edge(math.inf, math.inf)
 
 
 @dataclass(frozen=True)
@@ -89,71 +78,37 @@ def isotropic_plate(
 
 
 @dataclass(frozen=True)
-class Rib:
-    """A beam along a grid line, joined to the plate in deflection and twist.
+class Joist:
+    """A Timoshenko beam along x, joined to a plate in deflection and twist.
 
     Attributes
     ----------
-    along : str
-        Direction of the beam, `x` or `y`.
-    at : float
-        Its coordinate in the other direction, m: a line of the grid.
     bending, torsion : float
         E I and G J, N m2.
     warping : float
         Stiffness against the curvature of the twist, N m4: of lateral bending at a distance.
     flange, spring : float
-        Bending stiffness of a flange in N m2 that follows the rotation by a spring, N; the spring
-        may be infinite.
+        Bending stiffness of a flange, N m2, that follows the rotation by a spring, N.
     mass, torsional_inertia : float
         Mass, kg/m, and polar moment of inertia, kg m, per length.
-    shear_stiffness : float
-        kappa G A, N; infinite for an Euler beam.
+    shear : float
+        Shear stiffness kappa G A, N.
     rotary_inertia : float
-        rho I of a beam with shear, kg m.
+        rho I, kg m.
     loss_factor : float
         Loss factor of all its stiffnesses.
-    plate : int
-        Index of the plate that carries it.
     """
 
-    along: str
-    at: float
     bending: float
-    torsion: float = 0.0
-    warping: float = 0.0
-    flange: float = 0.0
-    spring: float = 0.0
-    mass: float = 0.0
-    torsional_inertia: float = 0.0
-    shear_stiffness: float = INFINITE
-    rotary_inertia: float = 0.0
-    loss_factor: float = 0.0
-    plate: int = 0
-
-
-@dataclass(frozen=True)
-class LineSpring:
-    """A spring along a grid line: stiffness per length against w, N/m2, and slope across, N.
-
-    It stands between a plate and the ground, or the same line of another plate.
-    """
-
-    along: str
-    at: float
-    translation: float = 0.0
-    rotation: float = 0.0
-    loss_factor: float = 0.0
-    plate: int = 0
-    other: int | None = None
-
-
-@dataclass(frozen=True)
-class Layer:
-    """A resilient layer between the plates 0 and 1: stiffness per area, N/m3."""
-
-    stiffness: float
-    loss_factor: float = 0.0
+    torsion: float
+    warping: float
+    flange: float
+    spring: float
+    mass: float
+    torsional_inertia: float
+    shear: float
+    rotary_inertia: float
+    loss_factor: float
 
 
 @dataclass(frozen=True)
@@ -165,8 +120,8 @@ class System:
     stiffness, mass : sparse arrays, shape (n, n)
         Complex stiffness and mass.
     get_row : callable
-        `get_row(x, y, plate, x_order, y_order)` returns the values of the unknowns' functions, or
-        of derivatives, at points, shape (n_point, n).
+        `get_row(x, y, plate)` returns the values of the unknowns' functions at points, shape
+        (n_point, n).
     """
 
     stiffness: Any
@@ -184,191 +139,75 @@ def get_grid(length: float, size: float, lines: Sequence[float] = ()) -> Array:
     return np.append(np.concatenate(parts), ends[-1])
 
 
-def hermite_row(nodes: Array, x: ArrayLike, order: int = 0) -> Any:  # noqa: ANN401 - sparse
-    """Return the Hermite cubics, or a derivative, at points, shape (n_point, 2 n_node).
+def get_operator(basis: Any, derivative: Callable[[Any], Array]) -> Any:  # noqa: ANN401 - sparse
+    """Return the values of a derivative of all functions at the points of integration."""
+    fields = (derivative(field) for (field,) in basis.basis)
+    values = np.array([np.broadcast_to(field, basis.dx.shape).ravel() for field in fields])
+    columns = np.repeat(basis.element_dofs, basis.dx.shape[1], axis=1)
+    rows = np.broadcast_to(np.arange(values.shape[1]), values.shape)
+    entries = values.ravel(), (rows.ravel(), columns.ravel())
+    return sparse.csr_array(entries, shape=(values.shape[1], basis.N))
 
-    The unknowns are value and slope at each node in turn.
+
+class _Side:
+    """Hermite cubics along a side, with value and slope at each node as unknowns."""
+
+    def __init__(self, nodes: Array) -> None:
+        self.nodes, self.count = nodes, 2 * len(nodes)
+        self.basis = Basis(MeshLine(nodes), ElementLineHermite(), intorder=6)
+        self.weight = sparse.diags_array(self.basis.dx.ravel())
+        # Value, slope and curvature.
+        self.at = [
+            get_operator(self.basis, derivative)
+            for derivative in (np.asarray, lambda f: f.grad[0], lambda f: f.hess[0, 0])
+        ]
+
+    def product(self, a: int = 0, b: int = 0) -> Any:  # noqa: ANN401 - sparse
+        """Return the integrals of products of derivatives."""
+        return self.at[a].T @ self.weight @ self.at[b]
+
+    def pick(self, at: ArrayLike, order: int = 0) -> Any:  # noqa: ANN401 - sparse
+        """Return rows that pick value or slope at nodes."""
+        nodes = abs(self.nodes - np.atleast_1d(at)[:, None]).argmin(1)
+        return sparse.eye_array(self.count, format="csr")[2 * nodes + order]
+
+
+def _add_joists(
+    joist: Joist, sides: tuple[_Side, _Side], positions: Array, put: Callable[[Any, int], Any]
+) -> tuple[Any, Any]:
+    """Return stiffness and mass of joists among all unknowns.
+
+    Rotations of joists and flanges are continuous parabolas, which contain the slopes of cubics:
+    stiff springs do not lock.
     """
-    x = np.atleast_1d(np.asarray(x, float))
-    left = np.clip(np.searchsorted(nodes, x, "right") - 1, 0, len(nodes) - 2)
-    h = np.diff(nodes)[left]
-    t = (x - nodes[left]) / h
-    cubics = np.array([[1, 0, -3, 2], [0, 1, -2, 1], [0, 0, 3, -2], [0, 0, -1, 1]], float)
-    derivative = np.polynomial.polynomial.polyder(cubics.T, order)
-    values = np.polynomial.polynomial.polyval(t, derivative).T / h[:, None] ** order
-    values[:, 1::2] *= h[:, None]
-    columns = 2 * left[:, None] + np.arange(4)
-    rows = np.repeat(np.arange(len(x)), 4)
-    return sparse.csr_array(
-        (values.ravel(), (rows, columns.ravel())), shape=(len(x), 2 * len(nodes))
+    along, across = sides
+    one = sparse.eye_array(len(positions))
+    weight = sparse.kron(along.weight, one)
+    w, slope = (
+        [put(sparse.kron(at, across.pick(positions, order)), 0) for at in along.at]
+        for order in (0, 1)
     )
-
-
-def gauss_points(nodes: Array, count: int = POINTS) -> tuple[Array, Array]:
-    """Return points and weights of Gauss's quadrature over all elements."""
-    point, weight = np.polynomial.legendre.leggauss(count)
-    h = np.diff(nodes)[:, None]
-    return (nodes[:-1, None] + h * (1 + point) / 2).ravel(), (h * weight / 2).ravel()
-
-
-def _products(nodes: Array) -> dict[tuple[int, int], Any]:
-    """Return the integrals of products of derivatives of the orders (a, b)."""
-    x, weight = gauss_points(nodes)
-    rows = [hermite_row(nodes, x, order) for order in range(3)]
-    scale = sparse.diags_array(weight)
-    return {
-        (a, b): rows[a].T @ scale @ rows[b]
-        for a, b in [(0, 0), (1, 1), (2, 2), (0, 2), (2, 0)]
-    }  # fmt: skip
-
-
-def _held(nodes: Array, low: Edge, high: Edge) -> tuple[Array, Array]:
-    """Return whether edges hold the unknowns along the line across them, shape (2 n_node,)."""
-    held = np.zeros(2 * len(nodes), bool)
-    held[[0, -2]] = [math.isinf(edge.translation) for edge in (low, high)]
-    held[[1, -1]] = [math.isinf(edge.rotation) for edge in (low, high)]
-    return held
-
-
-class _Assembly:
-    """Matrices of all unknowns: those of the plates, then the rotations of beams with shear."""
-
-    def __init__(self, x: Array, y: Array, plates: Sequence[Plate], ribs: Sequence[Rib]) -> None:
-        self.nodes = {"x": x, "y": y}
-        self.products = {axis: _products(nodes) for axis, nodes in self.nodes.items()}
-        self.plates = plates
-        self.n_plate = 4 * len(x) * len(y)
-        self.total = self.n_plate * len(plates)
-        self.total += sum(
-            self.n_rotation(rib) for rib in ribs
-            for spring in (rib.shear_stiffness, rib.spring * bool(rib.flange))
-            if 0 < spring < math.inf
-        )  # fmt: skip
-        self.next_rotation = self.n_plate * len(plates)
-        self.stiffness = sparse.csr_array((self.total, self.total), dtype=complex)
-        self.mass = sparse.csr_array((self.total, self.total))
-        self.held = np.zeros(self.total, bool)
-
-    def n_rotation(self, rib: Rib) -> int:
-        return 2 * len(self.nodes[rib.along]) - 1
-
-    def place(self, matrix: Any, plate: int = 0, other: int | None = None) -> Any:  # noqa: ANN401 - sparse
-        """Return a matrix of a plate, or of the plates from one on, among all unknowns.
-
-        With another plate, return that of the difference of both.
-        """
-        entries, rows, columns, values = matrix.tocoo(), [], [], []
-        plates = [plate] if other is None else [plate, other]
-        for row, column in itertools.product(plates, plates):
-            rows.append(entries.row + row * self.n_plate)
-            columns.append(entries.col + column * self.n_plate)
-            values.append(entries.data if row == column else -entries.data)
-        return sparse.csr_array(
-            (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))),
-            shape=(self.total,) * 2,
-        )
-
-    def on_line(self, line: Rib | LineSpring, order: int, matrix: Any) -> Any:  # noqa: ANN401
-        """Return a matrix along a line, of w there or of the slope across it."""
-        row = hermite_row(self.nodes["y" if line.along == "x" else "x"], line.at, order)
-        across = row.T @ row
-        pair = (matrix, across) if line.along == "x" else (across, matrix)
-        return self.place(sparse.kron(*pair), line.plate, getattr(line, "other", None))
-
-    def row(self, x: ArrayLike, y: ArrayLike, plate: int, orders: tuple[int, int] = (0, 0)) -> Any:  # noqa: ANN401
-        """Return the values at points, shape (n_point, n)."""
-        along, across = (
-            hermite_row(self.nodes[axis], at, order)
-            for axis, at, order in zip("xy", (x, y), orders, strict=True)
-        )
-        rows = [sparse.kron(along[[i]], across[[i]]) for i in range(along.shape[0])]
-        entries = sparse.vstack(rows).tocoo()
-        return sparse.csr_array(
-            (entries.data, (entries.row, entries.col + plate * self.n_plate)),
-            shape=(len(rows), self.total),
-        )
-
-    def add_plate(self, index: int) -> None:
-        plate, px, py = self.plates[index], self.products["x"], self.products["y"]
-        bending = (
-            plate.d11 * sparse.kron(px[2, 2], py[0, 0])
-            + plate.d22 * sparse.kron(px[0, 0], py[2, 2])
-            + plate.d12 * (sparse.kron(px[2, 0], py[0, 2]) + sparse.kron(px[0, 2], py[2, 0]))
-            + 4 * plate.d66 * sparse.kron(px[1, 1], py[1, 1])
-        )
-        self.stiffness += (1 + 1j * plate.loss_factor) * self.place(bending, index)
-        self.mass += plate.mass * self.place(sparse.kron(px[0, 0], py[0, 0]), index)
-        x, y = self.nodes.values()
-        on_x, on_y = _held(x, *plate.edges[:2]), _held(y, *plate.edges[2:])
-        part = slice(index * self.n_plate, (index + 1) * self.n_plate)
-        self.held[part] = (on_x[:, None] | on_y).ravel()
-        for edge, along, at in zip(plate.edges, "yyxx", (x[0], x[-1], y[0], y[-1]), strict=True):
-            springs = [0.0 if math.isinf(k) else k for k in (edge.translation, edge.rotation)]
-            self.add_line(LineSpring(along, at, *springs, edge.loss_factor, index))
-
-    def add_line(self, line: LineSpring) -> None:
-        matrix = (1 + 1j * line.loss_factor) * self.products[line.along][0, 0]
-        for order, spring in enumerate((line.translation, line.rotation)):
-            if spring:
-                self.stiffness += spring * self.on_line(line, order, matrix)
-
-    def add_rib(self, rib: Rib) -> None:
-        product, loss = self.products[rib.along], 1 + 1j * rib.loss_factor
-        self.stiffness += loss * rib.torsion * self.on_line(rib, 1, product[1, 1])
-        self.stiffness += loss * rib.warping * self.on_line(rib, 1, product[2, 2])
-        self.mass += rib.mass * self.on_line(rib, 0, product[0, 0])
-        self.mass += rib.torsional_inertia * self.on_line(rib, 1, product[0, 0])
-        x, weight = gauss_points(self.nodes[rib.along])
-        at, scale = np.full(len(x), rib.at), sparse.diags_array(weight * loss)
-        # Slope and curvature at the Gauss points.
-        slope, rate = (
-            self.row(x, at, rib.plate, (order, 0))
-            if rib.along == "x"
-            else self.row(at, x, rib.plate, (0, order))
-            for order in (1, 2)
-        )
-        if math.isfinite(rib.shear_stiffness):
-            slope, rate = self.add_rotation(rib, rib.shear_stiffness, slope, scale)
-            self.mass += rib.rotary_inertia * (slope.T @ sparse.diags_array(weight) @ slope)
-        self.stiffness += rib.bending * (rate.T @ scale @ rate)
-        if rib.flange and 0 < rib.spring < math.inf:
-            _, rate = self.add_rotation(rib, rib.spring, slope, scale)
-        if rib.spring:
-            self.stiffness += rib.flange * (rate.T @ scale @ rate)
-
-    def add_rotation(self, rib: Rib, spring: float, slope: Any, scale: Any) -> tuple[Any, Any]:  # noqa: ANN401
-        """Add a rotation that follows a slope by a spring; return its values and derivatives.
-
-        It is a continuous parabola in each element; those contain the slopes of the cubics, so that
-        a stiff spring does not lock.
-        """
-        nodes = self.nodes[rib.along]
-        x, _ = gauss_points(nodes)
-        left = np.clip(np.searchsorted(nodes, x, "right") - 1, 0, len(nodes) - 2)
-        h = np.diff(nodes)[left]
-        t = (x - nodes[left]) / h
-        values = np.stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)], 1)
-        slopes = np.stack([4 * t - 3, 4 - 8 * t, 4 * t - 1], 1) / h[:, None]
-        columns = (self.next_rotation + 2 * left[:, None] + np.arange(3)).ravel()
-        rotation, rate = (
-            sparse.csr_array(
-                (value.ravel(), (np.repeat(np.arange(len(x)), 3), columns)),
-                shape=(len(x), self.total),
-            )
-            for value in (values, slopes)
-        )
-        strain = slope - rotation
-        self.stiffness += spring * (strain.T @ scale @ strain)
-        edges = self.plates[rib.plate].edges
-        ends = self.next_rotation, self.next_rotation + self.n_rotation(rib) - 1
-        for end, edge in zip(ends, edges[:2] if rib.along == "x" else edges[2:], strict=True):
-            self.held[end] = math.isinf(edge.rotation)
-        self.next_rotation += self.n_rotation(rib)
-        return rotation, rate
-
-    def add_layer(self, layer: Layer) -> None:
-        area = sparse.kron(self.products["x"][0, 0], self.products["y"][0, 0])
-        self.stiffness += layer.stiffness * (1 + 1j * layer.loss_factor) * self.place(area, 0, 1)
+    parabolas = along.basis.with_element(ElementLineP2())
+    turned = [
+        get_operator(parabolas, derivative) for derivative in (np.asarray, lambda f: f.grad[0])
+    ]
+    rotation, flange = ([put(sparse.kron(at, one), field) for at in turned] for field in (-2, -1))
+    stiffness = sum(
+        (1 + 1j * joist.loss_factor) * factor * (strain.T @ weight @ strain)
+        for factor, strain in [
+            (joist.bending, rotation[1]), (joist.shear, w[1] - rotation[0]),
+            (joist.flange, flange[1]), (joist.spring, rotation[0] - flange[0]),
+            (joist.torsion, slope[1]), (joist.warping, slope[2]),
+        ]
+    )  # fmt: skip
+    mass = sum(
+        factor * (motion.T @ weight @ motion)
+        for factor, motion in [
+            (joist.mass, w[0]), (joist.torsional_inertia, slope[0]),
+            (joist.rotary_inertia, rotation[0]),
+        ]
+    )  # fmt: skip
+    return stiffness, mass
 
 
 def assemble(  # noqa: PLR0913 - a grid, and the kinds of components
@@ -376,72 +215,97 @@ def assemble(  # noqa: PLR0913 - a grid, and the kinds of components
     y: Array,
     plates: Sequence[Plate],
     *,
-    ribs: Sequence[Rib] = (),
-    lines: Sequence[LineSpring] = (),
-    layer: Layer | None = None,
+    joist: Joist | None = None,
+    joists: ArrayLike = (),
+    support: tuple[float, float] | None = None,
+    channel: complex = 0.0,
+    layer: complex = 0.0,
 ) -> System:
-    """Return the matrices of plates on the grid with nodes at `x` and `y`, m."""
-    assembly = _Assembly(x, y, plates, ribs)
-    for index in range(len(plates)):
-        assembly.add_plate(index)
-    for rib in ribs:
-        assembly.add_rib(rib)
-    for line in lines:
-        assembly.add_line(line)
-    if layer:
-        assembly.add_layer(layer)
-    free = np.flatnonzero(~assembly.held)
+    """Return the matrices of one or two plates on the grid with nodes at `x` and `y`, m.
 
-    def get_row(
-        at_x: ArrayLike, at_y: ArrayLike, plate: int = 0, x_order: int = 0, y_order: int = 0
-    ) -> object:
-        return assembly.row(at_x, at_y, plate, (x_order, y_order)).tocsc()[:, free]
-
-    stiffness, mass = (
-        matrix.tocsc()[:, free][free].tocsc() for matrix in (assembly.stiffness, assembly.mass)
-    )
-    return System(stiffness, mass, get_row)
-
-
-def get_modes(system: System, count: int, shift: float = 1.0) -> tuple[Array, Array]:
-    """Return natural frequencies without losses, Hz, and modes of unit modal mass.
-
-    Parameters
-    ----------
-    system
-        Matrices.
-    count
-        Number of modes.
-    shift
-        Frequency, Hz, of the negative shift, which makes the stiffness of free plates regular.
-
-    Returns
-    -------
-    frequency : ndarray, shape (count,)
-        Ascending.
-    vectors : ndarray, shape (n, count)
-        Unknowns; `system.get_row(x, y) @ vectors` are values at points.
+    `joists` are the positions across, m, of all `joist` of the plate 0, and of springs along them,
+    `channel`, N/m2, between both plates, which also have a layer of a stiffness per area, `layer`,
+    N/m3. `support` is a spring along y: its position, m, and stiffness, N/m2.
     """
-    square, vectors = eigsh(
-        system.stiffness.real.tocsc(), count, system.mass, sigma=-((2 * math.pi * shift) ** 2)
-    )
+    sides = along, across = _Side(x), _Side(y)
+    positions = np.atleast_1d(joists)
+    area, n = sparse.kron(along.product(), across.product()), along.count * across.count
+    sizes = [n] * len(plates) + [(2 * len(x) - 1) * len(positions)] * 2 * bool(joist)
+    stiffness = sparse.csr_array((sum(sizes),) * 2, dtype=complex)
+    mass = sparse.csr_array((sum(sizes),) * 2)
+    held = np.zeros(sum(sizes), bool)
+
+    def put(operator: Any, field: int) -> Any:  # noqa: ANN401 - sparse
+        blocks = [sparse.csr_array((operator.shape[0], size)) for size in sizes]
+        blocks[field] = operator
+        return sparse.hstack(blocks, "csr")
+
+    every = [put(sparse.eye_array(n), i) for i in range(len(plates))]
+    for plate, own in zip(plates, every, strict=True):
+        bending = sum(
+            factor * sparse.kron(along.product(a, b), across.product(c, d))
+            for factor, a, b, c, d in [
+                (plate.d11, 2, 2, 0, 0), (plate.d22, 0, 0, 2, 2), (plate.d12, 2, 0, 0, 2),
+                (plate.d12, 0, 2, 2, 0), (4 * plate.d66, 1, 1, 1, 1),
+            ]
+        )  # fmt: skip
+        bending = (1 + 1j * plate.loss_factor) * bending
+        for i, edge in enumerate(plate.edges):
+            side = sides[i // 2]
+            for order, spring in enumerate((edge.translation, edge.rotation)):
+                row = side.pick(side.nodes[-(i % 2)], order)
+                one, two = row.T @ row, sides[1 - i // 2].product()
+                pair = (one, two) if i < 2 else (two, one)
+                if math.isinf(spring):
+                    held |= own.T @ sparse.kron(*pair).diagonal() > 0
+                else:
+                    bending += spring * sparse.kron(*pair)
+        stiffness += own.T @ bending @ own
+        mass += own.T @ (plate.mass * area) @ own
+    if support:
+        row = along.pick(support[0])
+        spring = support[1] * sparse.kron(row.T @ row, across.product())
+        stiffness += every[0].T @ spring @ every[0]
+    lines = across.pick(positions)
+    if len(plates) > 1:
+        gap = every[1] - every[0]
+        spring = channel * sparse.kron(along.product(), lines.T @ lines) + layer * area
+        stiffness += gap.T @ spring @ gap
+    if joist:
+        added = _add_joists(joist, sides, positions, put)
+        stiffness, mass = stiffness + added[0], mass + added[1]
+        # The vertices come first.
+        ends = np.isin(np.arange(2 * len(x) - 1), [0, len(x) - 1])
+        ends &= math.isinf(plates[0].edges[0].rotation)
+        held[n * len(plates) :] = np.tile(np.repeat(ends, len(positions)), 2)
+    free = np.flatnonzero(~held)
+
+    def get_row(at_x: ArrayLike, at_y: ArrayLike, plate: int = 0) -> Any:  # noqa: ANN401 - sparse
+        values = [
+            side.basis.probes(np.reshape(at, (1, -1))).toarray().T
+            for side, at in zip(sides, (at_x, at_y), strict=True)
+        ]
+        return (sparse.csr_array(khatri_rao(*values).T) @ every[plate])[:, free]
+
+    return System(stiffness.tocsc()[:, free][free], mass.tocsc()[:, free][free], get_row)
+
+
+def get_modes(system: System, count: int) -> tuple[Array, Array]:
+    """Return natural frequencies without losses, Hz, and modes of unit modal mass, (n, count).
+
+    `system.get_row(x, y) @ vectors` are values at points.
+    """
+    # A negative shift of 1 Hz makes the stiffness of free plates regular.
+    square, vectors = eigsh(system.stiffness.real, count, system.mass, sigma=-((2 * math.pi) ** 2))
     order = np.argsort(square)
-    frequency = np.sqrt(np.maximum(square[order], 0)) / (2 * math.pi)
-    return frequency, vectors[:, order]
-
-
-def get_modal_loss(system: System, vectors: Array) -> Array:
-    """Return the loss factors of modes by the strain energies of the components."""
-    energy = np.einsum("ij,ij->j", vectors, system.stiffness @ vectors)
-    return np.asarray(energy.imag / energy.real)
+    return np.sqrt(np.maximum(square[order], 0)) / (2 * math.pi), vectors[:, order]
 
 
 def get_response(
     system: System,
     frequency: ArrayLike,
-    load: ArrayLike,
-    *,
-    output: Any = None,  # noqa: ANN401
+    load: Any,  # noqa: ANN401 - sparse
+    output: Any = None,  # noqa: ANN401 - sparse
 ) -> ComplexArray:
     """Return velocities due to harmonic forces, m/(N s), by direct solution.
 
@@ -451,30 +315,27 @@ def get_response(
         Matrices.
     frequency
         Frequencies, Hz, shape (n_frequency,).
-    load
-        Unknowns' functions where the forces act, shape (n, n_load): `get_row(...).T`.
-    output
-        Rows of the results; by default those of the loads.
+    load, output
+        Rows where the forces act, shape (n_load, n), and of the results, by default the same.
 
     Returns
     -------
     ndarray, shape (n_frequency, n_output, n_load)
     """
-    load = load.toarray() if sparse.issparse(load) else np.asarray(load)
-    output = load.T if output is None else output
+    output = load if output is None else output
     result = []
     for omega in 2 * math.pi * np.atleast_1d(np.asarray(frequency, float)):
         factors = splu(
             (system.stiffness - omega**2 * system.mass).tocsc(),
             permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True},
         )  # fmt: skip
-        result.append(1j * omega * (output @ factors.solve(load.astype(complex))))
+        result.append(1j * omega * (output @ factors.solve(load.T.toarray().astype(complex))))
     return np.array(result)
 
 
 def get_point_mobility(
-    system: System, frequency: ArrayLike, x: ArrayLike, y: ArrayLike, plate: int = 0
+    system: System, frequency: ArrayLike, x: ArrayLike, y: ArrayLike
 ) -> ComplexArray:
     """Return driving-point mobilities, m/(N s), shape (n_frequency, n_point)."""
-    rows = system.get_row(x, y, plate)
-    return np.diagonal(get_response(system, frequency, rows.T), axis1=1, axis2=2).copy()
+    answer = get_response(system, frequency, system.get_row(x, y))
+    return np.diagonal(answer, axis1=1, axis2=2).copy()

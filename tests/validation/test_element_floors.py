@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from baffled_plate import band_points, get_third
-from joists import JoistFloor, get_joists, get_ribs
+from baffled_plate import band_points
+from joists import JoistFloor
 from plate_elements import (
     CLAMPED,
     FREE,
@@ -75,11 +75,10 @@ def write_modes(
 
 def test_modes_of_elements_have_the_mobility_of_their_direct_solution(tmp_path: Path) -> None:
     # A free edge: shapes that end with a deflection.
-    system = elements((CLAMPED, SUPPORTED, FREE, SUPPORTED))
+    system = elements((CLAMPED, SUPPORTED, FREE, SUPPORTED), 0.2)
     floor = write_modes(tmp_path / "modes.csv", system, 900)
-    frequency = np.geomspace(18, 450, 160)
-    at = np.array([SOURCE[0] * LENGTH]), np.array([SOURCE[1] * WIDTH])
-    exact = get_point_mobility(system, frequency, *at)[:, 0]
+    frequency = np.geomspace(18, 450, 80)
+    exact = get_point_mobility(system, frequency, SOURCE[0] * LENGTH, SOURCE[1] * WIDTH)[:, 0]
     given = thud.mobility(floor, frequency).values
     bands = thud.get_bands("third")
     for low, high in zip(bands.lower[2:-2], bands.upper[2:-2], strict=True):
@@ -125,21 +124,18 @@ def test_input_holds_the_modes_of_the_elements(tmp_path: Path) -> None:
 @pytest.mark.parametrize("edge", [SUPPORTED, CLAMPED])
 def test_joist_floors_with_coupled_modes_are_as_compliant_as_elements(edge: Edge) -> None:
     """Receivers of such floors added the compliance above the last mode twice, and on joists."""
-    floor = JoistFloor(shear=True)
-    points = {"joist": (1.7, 2.3), "sheathing": (1.7, 2.1)}
+    floor = JoistFloor()
+    points = np.array([(1.7, 2.3), (1.7, 2.1)])
     plate = isotropic_plate(
         floor.stiffness, 0.2, floor.mass, (edge,) * 4, loss_factor=floor.loss_factor
     )
     x = get_grid(floor.length, 0.08, [1.7])
-    y = get_grid(floor.width, 0.08, [*get_joists(floor), 2.1])
-    ribs = [replace(rib, rotary_inertia=0.0) for rib in get_ribs(floor)]
-    system = assemble(x, y, [plate], ribs=ribs)
-    static = np.array([0.1])
-    thirds = zip(*get_third(np.array([100, 315])), strict=True)
-    bands = [band_points(*limits, 8) for limits in thirds]
-    frequency = np.concatenate([static, *bands])
-    exact = get_point_mobility(system, frequency, *np.transpose(list(points.values())))
-    for j, (x_at, y_at) in enumerate(points.values()):
+    y = get_grid(floor.width, 0.08, [*floor.positions, 2.1])
+    joist = replace(floor.joist, rotary_inertia=0.0)
+    system = assemble(x, y, [plate], joist=joist, joists=floor.positions)
+    frequency = np.concatenate([[0.1], band_points(100, 4), band_points(315, 4)])
+    exact = get_point_mobility(system, frequency, *points.T)
+    for j, (x_at, y_at) in enumerate(points):
         given = thud.mobility(
             thud.JoistFloor(
                 support="simple" if edge is SUPPORTED else "clamped", source_on="position",
@@ -156,17 +152,13 @@ def test_joist_floors_with_coupled_modes_are_as_compliant_as_elements(edge: Edge
 
 
 @pytest.mark.parametrize("side", [2.0, 4.5])
-def test_clamped_plates_are_no_more_compliant_than_elements(side: float) -> None:
+def test_clamped_plates_have_the_compliance_of_the_closed_form(side: float) -> None:
     """The compliance above the last mode was added twice: 14 % for a small plate."""
-    plate = isotropic_plate(STIFFNESS, 0.2, MASS, (CLAMPED,) * 4)
-    system = assemble(get_grid(side, side / 60), get_grid(side, side / 60), [plate])
     frequency = np.array([0.1])
-    exact = get_point_mobility(system, frequency, [side / 2], [side / 2])[0, 0]
     floor = thud.Plate(
         length=side, width=side, thickness=THICKNESS, density=DENSITY, wave_speed=WAVE_SPEED,
         support="clamped",
     )  # fmt: skip
-    # The closed form: 0.00560 F side**2/B in the middle (Timoshenko and Woinowsky-Krieger).
+    # 0.00560 F side**2/B in the middle (Timoshenko and Woinowsky-Krieger).
     static = 2 * np.pi * frequency * 0.00560 * side**2 / STIFFNESS
     assert thud.mobility(floor, frequency).values.imag == pytest.approx(static, rel=0.01)
-    assert thud.mobility(floor, frequency).values.imag == pytest.approx(exact.imag, rel=0.005)
