@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 import skfem
+from quadratic_impact import half_section
 from scipy import sparse
 from scipy.optimize import brentq
 from scipy.sparse.linalg import eigsh
@@ -126,14 +127,7 @@ def element_modes(ball: thud.Ball, through: int, along: int, count: int) -> NDAr
     def inertia(u: Any, v: Any, w: Any) -> Any:  # noqa: ANN401
         return density * dot(u, v) * w.x[0]
 
-    plane = skfem.MeshQuad2.from_mesh(
-        skfem.MeshQuad.init_tensor(
-            np.linspace(inner, outer, through + 1), np.linspace(0, np.pi, along + 1)
-        )
-    )
-    radius, angle = plane.doflocs
-    across = np.where(np.sin(angle) < 1e-12, 0, radius * np.sin(angle))
-    mesh = skfem.MeshQuad2(np.array((across, -radius * np.cos(angle))), plane.t)
+    mesh = half_section(inner, outer, through, along)
     form = skfem.BilinearForm
     displacement = skfem.Basis(mesh, skfem.ElementVector(skfem.ElementQuad2()), intorder=4)
     pressure = displacement.with_element(skfem.ElementQuad1())

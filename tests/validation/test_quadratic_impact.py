@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from quadratic_impact import HARD, Body, Rubber, drop_of_library
 
 import thud
-
-sys.path.insert(0, str(Path(__file__).parent))
-from quadratic_impact import HARD, Body, Rubber, drop_of_library
 
 if TYPE_CHECKING:
     from collections.abc import Callable
