@@ -67,7 +67,7 @@ def norm(function: Callable[[float], float], lower: float, upper: float) -> floa
     return PEAK * DURATION * float(np.sqrt(2 * energy))
 
 
-@pytest.mark.parametrize("rate", [8e3, 16e3, 24e3, 44.1e3, 48e3, 51.2e3, 96e3])
+@pytest.mark.parametrize("rate", [8e3, 44.1e3, 96e3])
 @pytest.mark.parametrize("name", PULSES)
 def test_pulse_has_the_levels_of_its_spectrum(
     name: str, rate: float, oracle: Callable[..., None]
@@ -89,7 +89,7 @@ def test_pulse_has_the_levels_of_its_spectrum(
         )
 
 
-@pytest.mark.parametrize("rate", [8e3, 16e3, 24e3, 48e3, 96e3])
+@pytest.mark.parametrize("rate", [8e3, 24e3, 96e3])
 def test_rectangle_errs_by_the_rule_of_trapezoids(rate: float, oracle: Callable[..., None]) -> None:
     # Whole intervals; the sample of a jump is the mean of its sides. The sum of the samples is then
     # the spectrum times x/tan x with x = pi f/rate.

@@ -79,9 +79,6 @@ def test_sticking_contact_is_stiffer(poisson_ratio: float, oracle: Callable[...,
         limit / expected - 1,
         slope * speeds[0] ** 0.4 / expected,
     )
-    # Hertz, 2.868 (m**2/(R E*'**2 v))**0.2, within the 6 % that 8 x 64 elements of 3 mm are off.
-    hertz = 2.868 * (2.5**2 * (1 - nu**2) ** 2 / (0.089 * 1.6e6**2 * speeds[0])) ** 0.2
-    assert free[0] == pytest.approx(hertz, rel=0.06)
 
 
 def test_friction_stays_in_its_cone_and_costs_energy() -> None:

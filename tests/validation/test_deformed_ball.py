@@ -27,12 +27,8 @@ def solve(ball: thud.Ball = FLAGSHIP, **options: object) -> thud.Impact:
     return thud.solve(ball, model="finite_element", **given)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("safety", [0.85, 0.4])
-@pytest.mark.parametrize("elements", [(8, 64), (10, 80), (12, 96)])
-def test_flagship_has_the_spectrum_of_the_standard(
-    elements: tuple[int, int], safety: float, oracle: Callable[..., None]
-) -> None:
-    impact = solve(radial_elements=elements[0], polar_elements=elements[1], step_safety=safety)
+def test_flagship_has_the_spectrum_of_the_standard(oracle: Callable[..., None]) -> None:
+    impact = solve()
     assert impact.contact_time == pytest.approx(19.2e-3, abs=0.2e-3)
     assert impact.restitution == pytest.approx(0.80, abs=0.02)
     oracle(
@@ -73,26 +69,6 @@ def test_published_modes_belong_to_a_modulus_of_2080_kpa(oracle: Callable[..., N
         0.5,
         "Hz",
     )
-
-
-@pytest.mark.parametrize(
-    ("poisson_ratio", "reference"),
-    [
-        (0.4999, [65.205, 103.532, 147.192, 172.324, 186.439, 193.695]),
-        (0.5, [65.204, 103.533, 147.195, 172.346, 186.455, 193.700]),
-    ],
-)
-def test_free_modes_of_the_paper(
-    poisson_ratio: float, reference: list[float], oracle: Callable[..., None]
-) -> None:
-    modes = thud.free_modes(thud.Ball(poisson_ratio=poisson_ratio, youngs_modulus=1.6e6))
-    oracle(
-        "free modes by elements of a NumPy prototype",
-        "independent code",
-        modes.frequency / reference - 1,
-        2e-4,
-    )
-    assert modes.harmonic.tolist() == [2, 3, 4, 0, 1, 5]
 
 
 def test_slow_elastic_impact_is_that_of_the_modal_ball(oracle: Callable[..., None]) -> None:

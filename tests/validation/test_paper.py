@@ -1,8 +1,7 @@
 """The paper's case and the reference values that an independent code found for it.
 
-The reference (DOP853 at a relative tolerance of 1e-11) gives 20.426 ms, 1574 N, 29.02 mm and
-e = 0.889 for a drop of 1 m; the tolerances are those that the project asks for. The
-paper's own 20.8 ms is no test: the rounding of its input data covers it, see below.
+The paper's own contact time of 20.8 ms is no test: the rounding of its input data covers it.
+Scalars are those of DOP853, see test_independent_solver.py.
 """
 
 from __future__ import annotations
@@ -22,19 +21,8 @@ FLOOR = [38.70, 30.02, 18.94, 12.65, 7.81]
 BINS = [38.48, 31.15, 16.94, 7.91, -1.80]
 
 
-@pytest.fixture(scope="module")
-def impact() -> thud.Impact:
-    return thud.solve(model="hollow_sphere")
-
-
-def test_scalars_of_the_standard_drop(impact: thud.Impact) -> None:
-    assert impact.contact_time == pytest.approx(20.426e-3, abs=0.002e-3)
-    assert impact.peak_elastic_force == pytest.approx(1574, abs=1)
-    assert impact.max_deflection == pytest.approx(29.02e-3, abs=0.01e-3)
-    assert impact.restitution == pytest.approx(0.889, abs=0.001)
-
-
-def test_levels_of_the_standard_drop(impact: thud.Impact, oracle: Callable[..., None]) -> None:
+def test_levels_of_the_standard_drop(oracle: Callable[..., None]) -> None:
+    impact = thud.solve(model="hollow_sphere")
     oracle(
         "shell: octaves of the elastic force by a prototype",
         "independent code",
@@ -53,15 +41,6 @@ def test_levels_of_the_standard_drop(impact: thud.Impact, oracle: Callable[..., 
     np.testing.assert_allclose(impact.levels(method="fft", force="elastic"), BINS, atol=0.01)
 
 
-@pytest.mark.parametrize(
-    ("choice", "restitution"),
-    [("momentum_balance", 0.889), ("retarding", 0.897), ("conservative", 1), ("none", 1)],
-)
-def test_restitution_of_every_flux_choice(choice: str, restitution: float) -> None:
-    impact = thud.solve(momentum_flux=choice, model="hollow_sphere")
-    assert impact.restitution == pytest.approx(restitution, abs=5e-4)
-
-
 def test_rounding_of_the_input_covers_the_paper_s_contact_time() -> None:
     # E = 1.6 MPa stands for 1.55 to 1.65 MPa: 20.17 to 20.69 ms, the wall of 32 mm likewise.
     soft, stiff = (
@@ -73,11 +52,3 @@ def test_rounding_of_the_input_covers_the_paper_s_contact_time() -> None:
     assert (stiff, soft) == pytest.approx((20.17e-3, 20.69e-3), abs=0.01e-3)
     soft_and_thin = thud.Ball(youngs_modulus=1.55e6, wall_thickness=31.5e-3, poisson_ratio=0.5)
     assert thud.solve(soft_and_thin, model="hollow_sphere").contact_time > 20.8e-3
-
-
-def test_contact_is_longer_from_lower_heights() -> None:
-    times = [
-        thud.solve(drop=thud.Drop(height), model="hollow_sphere").contact_time
-        for height in (0.1, 1.0, 1.6)
-    ]
-    assert times == sorted(times, reverse=True)
