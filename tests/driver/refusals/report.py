@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 from dataclasses import replace
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from conftest import REPOSITORY, SHELL, recorded
 from refusals.core import write
-from test_history import report, save
+from test_history import report
 
 import thud
 from thud.comparison.comparison import read_all
@@ -56,6 +57,12 @@ def copied(path: Path) -> Path:
     """Copy a file into the directory of the test, with a link to it; return its path."""
     Path("link.csv").symlink_to(path.name)
     return Path(shutil.copy(path, path.name))
+
+
+def save(path: Path, content: dict[str, Any]) -> None:
+    """Write a report in a directory of its own."""
+    path.parent.mkdir()
+    path.write_text(json.dumps(content), encoding="utf-8")
 
 
 def chart(**change: Any) -> History:  # noqa: ANN401
