@@ -64,7 +64,14 @@ def solve(ball: Case) -> Impact:
 '''
 # Base of the floors of rectangular plates, named like a group.
 RECTANGULAR = "rectangular_floor"
-# Groups that a case may ask for.
+# What the groups of every model say, and those that a case may ask for.
+GROUPS = {
+    "ball": "The ball or another source: geometry, mass and material",
+    "drop": "The drop: height and gravity",
+    "sampling": "Samples of the force: rate, duration and steps between them",
+    "levels": "How levels are computed, and of which force",
+    "limits": "The source whose limits apply",
+}
 OPTIONAL = {
     "modes": "Free modes that are requested.",
     "compression": "Quasi-static compression that is requested.",
@@ -234,7 +241,7 @@ def python_module(schema: Entry) -> str:
     parts = [HEAD.format(names=quoted_names, choices="".join(choices))]
     for group in groups:
         members = [key for key in keys if (key["owner"], key["group"]) == ("", group)]
-        parts.append(python_class(f"Group ``&{group}``.", members, group))
+        parts.append(python_class(f"{GROUPS.get(group, 'Keys')} (group ``&{group}``).", members, group))
     for owner in optional:
         members = [key for key in keys if key["owner"] == owner]
         parts.append(python_class(OPTIONAL[owner], members, owner))

@@ -13,7 +13,10 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import FunctionType
+from typing import get_args
 
+import thud
 from PIL import Image
 
 from examples import read_examples
@@ -33,12 +36,20 @@ def python_page() -> str:
     for example in read_examples():
         tasks.setdefault(example.task, []).extend(example.names)
     text = "# Python reference\n\nThe public names of the package `thud`, by task.\n"
+    aliases = []
     for title, names in tasks.items():
-        listed = "\n".join(f"   {name}" for name in names)
+        objects = {name: getattr(thud, name) for name in names}
+        pages = [name for name, one in objects.items() if isinstance(one, type | FunctionType)]
+        aliases += [(name, get_args(objects[name])) for name in names if name not in pages]
+        listed = "\n".join(f"   {name}" for name in pages)
         text += (
             f"\n## {title}\n\n```{{eval-rst}}\n.. currentmodule:: thud\n\n"
             f".. autosummary::\n   :toctree: generated\n   :nosignatures:\n\n{listed}\n```\n"
         )
+    text += "\n## Types of arguments\n\n"
+    for name, values in aliases:
+        words = [repr(v) if isinstance(v, str) else v.__name__ for v in values]
+        text += f"- `{name}`: one of {', '.join(f'`{word}`' for word in words)}\n"
     return text
 
 
@@ -90,6 +101,9 @@ def build(target: Path) -> None:
     environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
     command = [*sphinx, "-d", WORK / "doctrees", source, target]
     subprocess.run(command, check=True, env=environment)
+    for path in target.rglob("*.html"):  # what moves sideways, by the keyboard, too
+        text = path.read_text(encoding="utf-8")
+        path.write_text(text.replace("<pre>", '<pre tabindex="0">'), encoding="utf-8")
     for path in target.glob("_images/*.png"):
         reduce_colors(path)
     for path in target.glob("_downloads/*/*.ipynb"):

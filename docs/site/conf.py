@@ -123,10 +123,20 @@ def inches(path: Path) -> float:
 
 
 def scale_figures(app: Sphinx, document: nodes.document) -> None:
-    """Show all figures with text of one size, as far as the screen is wide enough."""
+    """Show all figures with text of one size, as far as the screen is wide enough.
+
+    A figure that is a link is none to itself; one that a tutorial draws is named as its section.
+    """
     for image in document.findall(nodes.image):
         width = inches(Path(app.srcdir) / image["uri"])
         image["width"] = f"{width * DENSITY:.0f}px"
+        if isinstance(image.parent, nodes.reference):
+            image["classes"].append("no-scaled-link")
+        if not image.get("alt"):
+            section = image.parent
+            while not isinstance(section, nodes.section):
+                section = section.parent
+            image["alt"] = section.next_node(nodes.title).astext()
 
 
 def show_signature(
@@ -147,6 +157,8 @@ def show_example(
     _: Sphinx, what: str, name: str, item: object, _options: object, lines: list[str]
 ) -> None:
     """Add to the text of a public name its example, and to a class what its base classes hold."""
+    pages = r":doc:`docs/\1.md </docs/\1>`"
+    lines[:] = [re.sub(r"(?<![`\w/])docs/(\w+)\.md", pages, line) for line in lines]
     example = EXAMPLES.get(name.removeprefix("thud."))
     if what not in {"class", "function", "data", "exception"} or not example:
         return
@@ -247,7 +259,9 @@ def shorten_navigation(
 
         def navigation(**options: bool) -> str:
             if key not in NAVIGATION:
-                NAVIGATION[key] = toctree(**options | {"collapse": True, "maxdepth": 1})
+                found = toctree(**options | {"collapse": True, "maxdepth": 1})
+                # A heading without its level says nothing to screen readers.
+                NAVIGATION[key] = found.replace('role="heading"', 'role="heading" aria-level="2"')
             return NAVIGATION[key]
 
         context["toctree"] = navigation

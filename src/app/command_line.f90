@@ -72,6 +72,7 @@ contains
       type(outcome_type) :: outcome
       type(error_type), allocatable :: error
       type(buffer_type), allocatable, volatile :: buffers(:)
+      character(len=128) :: message
       integer :: i, status
 
       exit_code = 0
@@ -88,7 +89,7 @@ contains
          allocate (buffers(request%threads))
          ! One by one, as Linux refuses more at once than the machine has.
          do i = 1, size(buffers)
-            allocate (buffers(i)%bytes(blas_memory), stat=status)
+            allocate (buffers(i)%bytes(blas_memory), stat=status, errmsg=message)
             if (status /= 0) exit
          end do
          deallocate (buffers)

@@ -218,5 +218,5 @@ def test_schema_of_the_repository_is_fresh(executable: str, tmp_path: Path) -> N
     generate = [sys.executable, REPOSITORY / "driver/generate_schema.py", tmp_path]
     subprocess.run(generate, input=schema, check=True)
     for name in made:
-        assert (package / name).read_text() == (ours / name).read_text(), name
+        assert (package / name).read_text() == (ours / name).read_text(), "run ./bootstrap schema"
     assert {entry["group"] for entry in json.loads(schema)["keys"]} >= {"ball", "mesh", "limits"}

@@ -7,7 +7,7 @@ import os
 import re
 import shutil
 from html.parser import HTMLParser
-from types import ModuleType
+from types import FunctionType
 from typing import TYPE_CHECKING
 from urllib.parse import unquote, urlsplit
 
@@ -30,7 +30,7 @@ THEORY = (
     *("ball_impedance", "floors", "room_theory", "levels", "recordings_theory"),
 )
 TUTORIALS = [path.stem for path in (REPOSITORY / "docs/tutorials").glob("*.md")]
-NAMES = [name for name in thud.__all__ if not isinstance(getattr(thud, name), ModuleType)]
+NAMES = [n for n in thud.__all__ if isinstance(getattr(thud, n), type | FunctionType)]
 SIZE = 15e6  # bytes
 # Pages of all kinds, and the widths of a phone, a tablet and a laptop, px.
 LOOKED_AT = (

@@ -89,7 +89,7 @@ BandSet = Literal["octave", "third"]
 
 @dataclass(frozen=True)
 class Ball(Group):
-    """Group ``&ball``.
+    """The ball or another source: geometry, mass and material (group ``&ball``).
 
     Attributes
     ----------
@@ -123,7 +123,7 @@ class Ball(Group):
 
 @dataclass(frozen=True)
 class Drop(Group):
-    """Group ``&drop``.
+    """The drop: height and gravity (group ``&drop``).
 
     Attributes
     ----------
@@ -139,7 +139,7 @@ class Drop(Group):
 
 @dataclass(frozen=True)
 class Sampling(Group):
-    """Group ``&sampling``.
+    """Samples of the force: rate, duration and steps between them (group ``&sampling``).
 
     Attributes
     ----------
@@ -161,7 +161,7 @@ class Sampling(Group):
 
 @dataclass(frozen=True)
 class Levels(Group):
-    """Group ``&levels``.
+    """How levels are computed, and of which force (group ``&levels``).
 
     Attributes
     ----------
@@ -181,7 +181,7 @@ class Levels(Group):
 
 @dataclass(frozen=True)
 class Limits(Group):
-    """Group ``&limits``.
+    """The source whose limits apply (group ``&limits``).
 
     Attributes
     ----------
