@@ -241,7 +241,8 @@ def python_module(schema: Entry) -> str:
     parts = [HEAD.format(names=quoted_names, choices="".join(choices))]
     for group in groups:
         members = [key for key in keys if (key["owner"], key["group"]) == ("", group)]
-        parts.append(python_class(f"{GROUPS.get(group, 'Keys')} (group ``&{group}``).", members, group))
+        title = f"{GROUPS.get(group, 'Keys')} (group ``&{group}``)."
+        parts.append(python_class(title, members, group))
     for owner in optional:
         members = [key for key in keys if key["owner"] == owner]
         parts.append(python_class(OPTIONAL[owner], members, owner))

@@ -103,7 +103,10 @@ def build(target: Path) -> None:
     subprocess.run(command, check=True, env=environment)
     for path in target.rglob("*.html"):  # what moves sideways, by the keyboard, too
         text = path.read_text(encoding="utf-8")
-        path.write_text(text.replace("<pre>", '<pre tabindex="0">'), encoding="utf-8")
+        for tag in ("<pre>", "<table>", '<table border="1" class="dataframe">'):
+            text = text.replace(tag, f'{tag[:-1]} tabindex="0">')
+        text = text.replace('<div class="table-wrapper', '<div tabindex="0" class="table-wrapper')
+        path.write_text(text, encoding="utf-8")
     for path in target.glob("_images/*.png"):
         reduce_colors(path)
     for path in target.glob("_downloads/*/*.ipynb"):

@@ -193,7 +193,7 @@ def test_temperatures_and_calibrations_are_shown() -> None:
     assert row[1:4] == ("–", "19.0", "20.0")
     assert "(temperature 19.0 to 23.0 °C)" in found.warnings()[0]
     figure = draw_history(found)
-    assert figure.legends[0].get_title().get_text() == "ball 7"
+    assert figure.legends[0].get_title().get_text() == "ball_7"
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert {"calibration", "warning limits (2 σ)", "action limits (3 σ)"} <= set(labels)
     panel = next(axes for axes in figure.axes if axes.get_ylabel().startswith("Temperature"))

@@ -237,12 +237,16 @@ def test_gallery_shows_the_figures_of_a_tutorial(pages: dict[str, Page], tutoria
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-def test_nothing_is_clipped(site: Path, tab: Tab, width: int) -> None:
+def test_nothing_is_clipped_or_hidden_from_readers(site: Path, tab: Tab, width: int) -> None:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
     tab.set_viewport_size({"width": width, "height": 900})
     for name in LOOKED_AT:
         tab.goto(f"file://{site}/{name}.html")
         assert tab.evaluate("document.documentElement.scrollWidth") <= width, name
         assert not tab.evaluate(CLIPPED), name
+        if width == min(WIDTHS):
+            faults = axe.run(tab).response["violations"]
+            assert not [f["id"] for f in faults if f["impact"] in {"serious", "critical"}], name
 
 
 def test_subscripts_stand_below_their_letters(site: Path, tab: Tab) -> None:
