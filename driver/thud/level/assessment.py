@@ -358,6 +358,7 @@ def assess_levels(  # noqa: PLR0913, PLR0917 - each is one criterion of the stan
     """
     # Arrays of other libraries yield scalars of their own.
     is_array = hasattr(levels, "__array__")
+    require_kind("levels", levels, Iterable)
     octaves = [*(plain(np.atleast_1d(np.asarray(levels))) if is_array else levels)]
     nominal = get_bands(BANDWIDTHS[0]).nominal
     if len(octaves) != len(nominal):
