@@ -25,7 +25,6 @@ REPLACED = {
     r"(?m)^ *include .*": "",
 }
 FACADE = "thud"
-FRONT = "---\ntocdepth: 2\nnosearch: true\n---"
 REFERENCE = """---
 nosearch: true
 ---
@@ -186,6 +185,7 @@ def write_pages(sources: Path, copy: Path, target: Path) -> None:
     listed = []
     for folder, members in sorted(folders.items()):
         sections = [section for module in members for section in pages.module(module)]
+        # Neither does the search of the guide find them: the page of all names has one of its own.
         # The list of sections beside the page holds those of modules only.
         text = "\n".join(
             ["---\ntocdepth: 2\nnosearch: true\n---\n", heading(1, f"src/{folder}"), *sections]

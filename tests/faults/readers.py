@@ -145,11 +145,6 @@ def _tables() -> dict[str, tuple[str, Reader]]:
     }
 
 
-def _read_config(path: Path, _: random.Random) -> str:
-    read_config(path)
-    return ""
-
-
 def _read_sets(path: Path, _: random.Random) -> str:
     Path("case.nml").write_text(CASE)
     done = subprocess.run(
