@@ -14,7 +14,7 @@ IDLE = 1.3
 LOWER = ("times", "/s")
 REQUIRED: dict[str | tuple[str, str], dict[str, float]] = {
     "thud, whole process": {"ms": 50},
-    "thud.solve, shell of the paper": {"ms": 2},
+    "thud.solve, shell": {"ms": 2},
     ("levels, exact, five octaves", "SciPy ZoomFFT, 64 lines per band"): {"times": 3},
     "levels, fft, five octaves": {"times": 1.5},
     ("ensemble, trajectories", "heyoka, batch mode"): {"times": 1},

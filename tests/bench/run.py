@@ -40,10 +40,9 @@ EXECUTABLE = Path(sysconfig.get_path("scripts")) / "thud"
 PAGE = Path(__file__).parents[2] / "docs/speed.md"
 TEXT = """# Speed
 
-thud and what else computes the same, each measured in turn in one run on one thread: what
-`./bootstrap bench --page` printed, with the release, the processor and the load of the machine.
-Rates of ensembles are per second of processor time, for two threads per second of elapsed time;
-heyoka computes only the motion, thud also writes 901 samples of two forces for each drop.
+What `./bootstrap bench --page` printed: thud and what else computes the same, in turn, on one
+thread. Rates are per second of processor time, for two threads of elapsed time; heyoka computes
+only the motion, thud also writes 901 samples of two forces for each drop.
 
 ```
 {}```
@@ -148,7 +147,7 @@ def main() -> int:
         row("thud, whole process", "python, imports of NumPy and SciPy alone", process)
 
     shell = medians(lambda: thud.solve(model="hollow_sphere"), scipy_drop, 51)
-    row("thud.solve, shell of the paper", "SciPy solve_ivp, DOP853", shell)
+    row("thud.solve, shell", "SciPy solve_ivp, DOP853", shell)
     transforms = zoom_transforms(len(contact))
     rows: tuple[tuple[Literal["exact", "fft"], str, Callable[[], object]], ...] = (
         ("exact", "SciPy ZoomFFT, 64 lines per band", lambda: zoom_levels(contact, transforms)),
