@@ -159,6 +159,7 @@ def test_clamped_plates_have_the_compliance_of_the_closed_form(side: float) -> N
         length=side, width=side, thickness=THICKNESS, density=DENSITY, wave_speed=WAVE_SPEED,
         support="clamped",
     )  # fmt: skip
-    # 0.00560 F side**2/B in the middle (Timoshenko and Woinowsky-Krieger).
-    static = 2 * np.pi * frequency * 0.00560 * side**2 / STIFFNESS
-    assert thud.mobility(floor, frequency).values.imag == pytest.approx(static, rel=0.01)
+    # 0.00560 F side**2/B in the middle (Timoshenko and Woinowsky-Krieger); Ritz's method with up to
+    # 28 x 28 symmetric polynomials, extrapolated, gives the further digits.
+    static = 2 * np.pi * frequency * 0.005612 * side**2 / STIFFNESS
+    assert thud.mobility(floor, frequency).values.imag == pytest.approx(static, rel=1e-3)
