@@ -62,14 +62,8 @@ contains
       type(sampling_type), intent(in), optional :: sampling
       type(force_history_type) :: history
       type(error_type), allocatable :: error
-      type(ball_type) :: its_ball
-      type(drop_type) :: its_drop
-      type(sampling_type) :: its_sampling
 
-      if (present(ball)) its_ball = ball
-      if (present(drop)) its_drop = drop
-      if (present(sampling)) its_sampling = sampling
-      call solve_drop(model, its_ball, its_drop, its_sampling, history, error)
+      call solve_drop(model, ball_of(ball), drop_of(drop), sampling_of(sampling), history, error)
       call check_solved(error)
    end function solved_drop
 
@@ -98,15 +92,33 @@ contains
       type(receiver_type), intent(in), optional :: receiver
       type(force_history_type), intent(out) :: history
       type(error_type), allocatable, intent(out) :: error
-      type(ball_type) :: its_ball
-      type(drop_type) :: its_drop
-      type(sampling_type) :: its_sampling
 
-      if (present(ball)) its_ball = ball
-      if (present(drop)) its_drop = drop
-      if (present(sampling)) its_sampling = sampling
-      call model%solve(its_ball, its_drop, its_sampling, history, error, receiver)
+      call model%solve(ball_of(ball), drop_of(drop), sampling_of(sampling), history, error, receiver)
    end subroutine solve
+
+   !> A ball as stated, or the default one.
+   pure function ball_of(stated) result(ball)
+      type(ball_type), intent(in), optional :: stated
+      type(ball_type) :: ball
+
+      if (present(stated)) ball = stated
+   end function ball_of
+
+   !> A drop as stated, or the default one.
+   pure function drop_of(stated) result(drop)
+      type(drop_type), intent(in), optional :: stated
+      type(drop_type) :: drop
+
+      if (present(stated)) drop = stated
+   end function drop_of
+
+   !> Samples as stated, or the default ones.
+   pure function sampling_of(stated) result(sampling)
+      type(sampling_type), intent(in), optional :: stated
+      type(sampling_type) :: sampling
+
+      if (present(stated)) sampling = stated
+   end function sampling_of
 
    !> Code and subject of the error that the keys of a model bring together.
    function get_refusal(model, ball, sampling) result(refusal)
@@ -115,12 +127,8 @@ contains
       type(sampling_type), intent(in), optional :: sampling
       character(len=:), allocatable :: refusal
       type(error_type), allocatable :: error
-      type(ball_type) :: its_ball
-      type(sampling_type) :: its_sampling
 
-      if (present(ball)) its_ball = ball
-      if (present(sampling)) its_sampling = sampling
-      call model%check(its_ball, its_sampling, error)
+      call model%check(ball_of(ball), sampling_of(sampling), error)
       refusal = subject_of(error)
    end function get_refusal
 
