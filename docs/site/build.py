@@ -103,7 +103,7 @@ def build(target: Path) -> None:
     subprocess.run(command, check=True, env=environment)
     for path in target.rglob("*.html"):  # what moves sideways, by the keyboard, too
         text = path.read_text(encoding="utf-8")
-        for tag in ("<pre>", "<table>", '<table border="1" class="dataframe">'):
+        for tag in ("<pre>", "<table>", '<table border="1" class="dataframe">', '<div class="math">'):
             text = text.replace(tag, f'{tag[:-1]} tabindex="0">')
         text = text.replace('<div class="table-wrapper', '<div tabindex="0" class="table-wrapper')
         path.write_text(text, encoding="utf-8")

@@ -204,7 +204,7 @@ def write_mathml(translator: HTML5Translator, node: nodes.math | nodes.math_bloc
     formula = re.sub(rf"(?<![^9];</mo>)(?<!<mrow>)(?={name})", thin, formula)
     formula = re.sub(rf"({name})(?!<mo)", rf"\1{thin}", formula)
     formula = formula.replace("<mo>&#x0002F;</mo>", '<mo lspace="0" rspace="0">/</mo>')
-    translator.body.append(f'<div class="math" tabindex="0">{formula}</div>' if block else formula)
+    translator.body.append(f'<div class="math">{formula}</div>' if block else formula)
     raise nodes.SkipNode
 
 
