@@ -233,7 +233,7 @@ def test_force_that_is_not_that_on_the_floor_raises_a_warning(shell: thud.Impact
         ]
     notes = Note("a", others={"name": "&a", "text": "b"}), Note("blocked_force", value=1.0)
     assert replace(enough, floor_notes=notes).notes == notes
-    # A fact of the library is told in its words, whatever the code.
+    # A fact of the library is stated in its words, whatever the code.
     for code in ("a", *WARNINGS, *PROCESSING):
         note = Note(code, "room", others={"name": "&room", "text": "is large"})
         assert str(note) == "&room is large"

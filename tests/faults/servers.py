@@ -128,7 +128,7 @@ def _hostile_request(address: str, chance: random.Random) -> None:
 
 
 def _killed_work(address: str, chance: random.Random) -> tuple[str, str] | None:
-    """Kill the process that works: its page is told."""
+    """Kill the process that works: its page says so."""
     with _begin(address, "/solve", json.dumps(LONG).encode()) as connection:
         answer = http.client.HTTPResponse(connection)
         time.sleep(chance.uniform(0, 0.2))
