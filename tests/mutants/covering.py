@@ -52,8 +52,9 @@ data_file = {data}
 class Covering:
     """Tests by the lines that they reach.
 
-    A test is the name of a Fortran suite, or `file::function` of Python, or `file` where no more is
-    known: of the core, and of what fixtures run.
+    A test is the name of a Fortran suite, or `file::function` of Python, or `file` for what its
+    fixtures run. Each file of Python counts as reaching all of the core, whose counts would make
+    it several times as slow.
     """
 
     def __init__(
@@ -78,6 +79,8 @@ class Covering:
                 for tests in self._lines.get(file, {}).values()
                 for test in tests
             }
+        if change.path.startswith("src/"):
+            found |= {test for test in self._seconds if test.endswith(".py")}
         return sorted(found, key=self.seconds)
 
     def seconds(self, test: str) -> float:
@@ -114,11 +117,13 @@ def _bodies(path: Path) -> set[int]:
     }
 
 
-def read_covering(folder: Path, new_trees: Callable[[], list[Tree]]) -> Covering:
+def read_covering(
+    folder: Path, trees: list[Tree], new_counting: Callable[[], list[Tree]]
+) -> Covering:
     """Return the record of the present state of the project.
 
-    What is missing of it is measured: each suite and each file of tests by itself, in trees whose
-    build counts lines.
+    What is missing of it is measured: each file of Python by itself in trees, each suite in trees
+    whose build counts lines.
     """
     digest = sha256()
     for path in sorted(path for pattern in STATE for path in ROOT.glob(pattern)):
@@ -128,7 +133,9 @@ def read_covering(folder: Path, new_trees: Callable[[], list[Tree]]) -> Covering
     suites = [path.stem for path in (ROOT / "tests/fortran").glob("test_*.pf")]
     files = [path for part in STATE[-2:] for path in ROOT.glob(part) if path.match("test_*.py")]
     jobs = [*(path for path in files if path.stem not in LEFT_OUT), *suites]
-    missing = [job for job in jobs if not _record(records, job).exists()]
+
+    def missing(kind: type) -> list[str | Path]:
+        return [job for job in jobs if isinstance(job, kind) and not _record(records, job).exists()]
 
     def measure(tree: Tree, job: str | Path) -> None:
         place = folder / "data" / _record(records, job).stem
@@ -143,8 +150,9 @@ def read_covering(folder: Path, new_trees: Callable[[], list[Tree]]) -> Covering
         shutil.rmtree(place, ignore_errors=True)
         _record(records, job).write_text(json.dumps(measured))
 
-    if missing:
-        in_parallel(measure, new_trees(), missing, "files of tests")
+    in_parallel(measure, trees, missing(Path), "files of tests")
+    if missing(str):
+        in_parallel(measure, new_counting(), missing(str), "suites")
     lines: dict[str, dict[int, set[str]]] = defaultdict(lambda: defaultdict(set))
     seconds: dict[str, float] = {}
     for job in jobs:
@@ -177,9 +185,7 @@ def _python_file(
         f"--junitxml={room / 'times.xml'}",
     ]
     try:
-        tree.run_tests(
-            [name], *more, seconds=LIMIT, GCOV_PREFIX=str(room), COVERAGE_RCFILE=str(settings)
-        )
+        tree.run_tests([name], *more, seconds=LIMIT, COVERAGE_RCFILE=str(settings))
     except TimeoutExpired:
         return [], {}
     seconds: dict[str, float] = defaultdict(float)
@@ -196,7 +202,6 @@ def _python_file(
         for *place, test in _driver_lines(tree, room, name)
         if test in passed or test == name
     ]
-    reached += [(*place, name) for place in _core_lines(tree, room)]
     return reached, passed | {name: sum(passed.values())}  # type: ignore[return-value]
 
 

@@ -111,9 +111,9 @@ def main() -> int:
     parser.add_argument(
         "--limit",
         type=float,
-        default=300.0,
+        default=600.0,
         metavar="S",
-        help="seconds of tests for one change (default: 300)",
+        help="seconds of tests for one change (default: 600)",
     )
     options = parser.parse_args()
     width = len(os.sched_getaffinity(0))
@@ -121,10 +121,8 @@ def main() -> int:
     def new_trees(name: str, flags: str) -> list[Tree]:
         return [Tree(FOLDER / f"{name}-{n}", flags) for n in range(width)]
 
-    # The executable ends by _exit, which would write no counts.
-    flags = "-O1 --coverage -D_exit=exit"
-    covering = read_covering(FOLDER, partial(new_trees, "coverage", flags))
     trees = new_trees("tree", "-O1")
+    covering = read_covering(FOLDER, trees, partial(new_trees, "coverage", "-O1 --coverage"))
     record = FOLDER / f"seed-{options.seed}.json"
     known: dict[str, str] = json.loads(record.read_text()) if record.exists() else {}
     drawn = draw(options.paths or [ROOT / "src", ROOT / "driver"], options.seed)
