@@ -1,38 +1,27 @@
 """Numbers at the edges: keys over their whole ranges; no wrong number without a word.
 
-What `cases` draws and thud does not refuse keeps laws, and of a share is compared with finer steps
-and with other units.
+What `cases` draws and thud does not refuse keeps laws; a share is compared with finer steps.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from cases import LUMPED, draw_case
+from cases import draw_case
 
 import thud
-from thud.base._schema import KEYS
 from thud.case.case import case_text
 
 if TYPE_CHECKING:
     import random
-    from collections.abc import Iterable
-
-    from thud.base.key import Group, Key
 
 # What balances may miss: of lumped sources, and of finite elements.
 BALANCE, FE_BALANCE = 1e-6, 0.005
 # Changes of contact time and restitution by steps half as long, measured up to 2e-6.
 STEP_CHANGE = 1e-5
-# Powers of mass, length and time in the units of keys.
-POWERS = {"": (0, 0, 0), "m": (0, 1, 0), "kg": (1, 0, 0), "s": (0, 0, 1), "Hz": (0, 0, -1),
-          "Pa": (1, -1, -2), "m/s2": (0, 1, -2), "s/m": (0, -1, 1), "N/m": (1, 0, -2),
-          "m/s": (0, 1, -1), "N s/m": (1, 0, -1), "m/(N s)": (-1, 0, 1), "m/(N s2)": (-1, 0, 0),
-          "kg/m3": (1, -3, 0)}  # fmt: skip
-SCALED_FLOORS = (None, "infinite_plate", "oscillator", "measured_mobility")
 
 
 def attempt(models: dict[str, int], chance: random.Random) -> tuple[str, str]:
@@ -44,7 +33,7 @@ def attempt(models: dict[str, int], chance: random.Random) -> tuple[str, str]:
         if wrong == "rigid: restitution" and is_of_step(impact):
             wrong = ""
         if not wrong and chance.random() < 0.1:
-            wrong = chance.choice([_finer_steps, _other_units])(impact, chance)
+            wrong = _finer_steps(impact)
     except thud.ThudError as error:
         return ("NaN", str(error)) if "NaN" in str(error) else ("refused", "")
     if wrong:
@@ -121,10 +110,13 @@ def _finer(impact: thud.Impact, factor: int) -> thud.Impact:
     return thud.solve(replace(impact.case, sampling=finer))
 
 
-def _finer_steps(impact: thud.Impact, _: random.Random) -> str:
+def _finer_steps(impact: thud.Impact) -> str:
     if isinstance(impact.case.model, thud.FiniteElement | thud.ModalBall):
         return ""
-    for one, other in _pairs(impact, _finer(impact, 2)):
+    finer = _finer(impact, 2)
+    for one, other in ((impact, finer), (impact.on_floor, finer.on_floor)):
+        if not one or not other:
+            continue
         changes = (one.contact_time / other.contact_time - 1, one.restitution - other.restitution)
         if max(map(abs, changes)) > STEP_CHANGE:
             return f"half the step changes contact time and restitution by {changes}"
@@ -136,60 +128,3 @@ def is_of_step(impact: thud.Impact) -> bool:
     excess = impact.restitution - 1
     is_noted = any(math.isclose(note.value, excess) for note in impact.notes)
     return is_noted and abs(_finer(impact, 4).restitution - 1) < excess / 4
-
-
-def _other_units(impact: thud.Impact, chance: random.Random) -> str:
-    """Compare with the same drop in other units of mass, length and time (Buckingham)."""
-    case = impact.case
-    mass, length = (4.0 ** chance.randint(-3, 3) for _ in range(2))
-    scales = [mass, length, chance.choice([0.5, 1, 2])]
-    # The resolution of others is for bands in Hz.
-    if case.model.name not in LUMPED or (case.floor and case.floor.name) not in SCALED_FLOORS:
-        return ""
-    try:
-        scaled = thud.solve(_scaled(case, scales))
-    except thud.InputError:
-        return ""  # a key is outside its range
-    unit = _unit(scales, (1, 1, -2))
-    for one, other in _pairs(impact, scaled):
-        change = np.abs(one.floor_force - other.floor_force / unit).max() / one.peak_force
-        if not change < 1e-6:
-            return f"units scaled by {scales} change the force by {change}"
-    return ""
-
-
-def _scaled(case: thud.Case, scales: list[float]) -> thud.Case:
-    groups = {}
-    for name in ("ball", "drop", "sampling", "model", "floor"):
-        if (group := getattr(case, name)) is None:
-            continue
-        owner = group.name if name in ("model", "floor") else ""
-        values = {one.name: getattr(group, one.name) for one in fields(group)}
-        for key in (key for key in KEYS if key.owner == owner and (owner or key.group == name)):
-            value, unit = values.get(key.name), _unit(scales, _powers(group, key))
-            if isinstance(value, tuple | list):
-                values[key.name] = [unit * one for one in value]
-            elif isinstance(value, float):
-                values[key.name] = unit * value
-        groups[name] = type(group)(**values)
-    return replace(case, **groups)
-
-
-def _powers(group: Group, key: Key) -> tuple[float, float, float]:
-    """Return the powers of mass, length and time in the unit of a key."""
-    if key.name == "stiffness" and isinstance(group, thud.HuntCrossley):
-        return 1, 1 - group.exponent, -2
-    if key.name == "carcass_stiffness" and isinstance(group, thud.TwoMass):
-        return 1, 1 - group.carcass_exponent, -2  # it is stated at 20 mm
-    return POWERS[key.unit]
-
-
-def _unit(scales: list[float], powers: tuple[float, float, float]) -> float:
-    return math.prod(scale**power for scale, power in zip(scales, powers, strict=True))
-
-
-def _pairs(one: thud.Impact, other: thud.Impact) -> Iterable[tuple[thud.Impact, thud.Impact]]:
-    """Return the answers on rigid floors, and on floors that move where both have one."""
-    yield one, other
-    if one.on_floor and other.on_floor:
-        yield one.on_floor, other.on_floor

@@ -1,19 +1,13 @@
-"""The executable, and the library that lets a call of the system go wrong; see `inject.c`."""
+"""The library that lets a call of the system go wrong; see `inject.c`."""
 
 from __future__ import annotations
 
 import os
 import shutil
 import subprocess
-import sysconfig
 from functools import cache
 from pathlib import Path
 from tempfile import mkdtemp
-
-
-def executable() -> str:
-    """Return the path of the installed executable."""
-    return str(Path(sysconfig.get_path("scripts")) / "thud")
 
 
 @cache

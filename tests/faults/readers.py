@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
+import sysconfig
 import tempfile
 import tomllib
 from datetime import UTC, datetime, timedelta
@@ -16,7 +17,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from damage import INNER, WORDS, damaged, damaged_text, fault_of, toml
-from injection import executable
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "driver"))
 from recording_files import WRITERS, half_sine
@@ -132,23 +132,22 @@ def _tables() -> dict[str, tuple[str, Reader]]:
     f, t = np.geomspace(10, 1000, 40), np.arange(400) / 8000
     y = thud.mobility(thud.Oscillator(), f).values
     pulse = 1500 * np.sin(np.pi * np.minimum(t / 0.02, 1))
+    lab = (INPUTS / "recordings/lab.toml").read_text()
     sets = "mass, height, exponent # drops\n2.5, 1.0, 1.5\n2.4, 0.9, 1.2\n2.6, 1.1, 2\n"
     return {
         "sets": (sets, _read_sets),
         "mobility": (csv("frequency (Hz), real, imaginary", f, y.real, y.imag), _read_mobility),
         "levels": ((INPUTS / "floors/field_levels.csv").read_text(), _read_levels),
         "force": (csv("time, force", t, pulse), _read_force),
-        "config": (
-            (INPUTS / "recordings/lab.toml").read_text(),
-            lambda p, _: str(read_config(p))[:0],
-        ),
+        "config": (lab, lambda path, _: str(read_config(path))[:0]),
     }
 
 
 def _read_sets(path: Path, _: random.Random) -> str:
     Path("case.nml").write_text(CASE)
+    executable = Path(sysconfig.get_path("scripts")) / "thud"
     done = subprocess.run(
-        [executable(), "case.nml", "--samples", path, "-q", "-o", "o", "--threads", "1"],
+        [executable, "case.nml", "--samples", path, "-q", "-o", "o", "--threads", "1"],
         capture_output=True, timeout=60, check=False,
     )  # fmt: skip
     said = done.stderr.decode(errors="surrogateescape")

@@ -61,7 +61,7 @@ def _ask(address: str, path: str, body: bytes, **headers: str) -> tuple[int, byt
 
 def attempt(chance: random.Random) -> tuple[str, str]:
     """Ask the explorer what no page would, then what one does."""
-    kind = chance.choice([_hostile_case, _hostile_record, _hostile_request, _killed_work])
+    kind = chance.choice([_hostile_case, _hostile_request, _killed_work])
     address, process, screen, expected = explorer()
     if wrong := kind(address, chance):
         return wrong
@@ -94,18 +94,6 @@ def _hostile_case(address: str, chance: random.Random) -> tuple[str, str] | None
         body = body[:at] + chance.randbytes(3) + body[at:]
     files = [f"/download/{name}" for name in ("case.nml", "force.csv", "case.py")]
     return _judged(*_ask(address, chance.choice(["/solve", *files]), body))
-
-
-def _hostile_record(address: str, chance: random.Random) -> tuple[str, str] | None:
-    name = chance.choice(["a.wav", "../../a.csv", "a.mat", "x" * 300 + ".tdms", ".uff", "a\0.csv"])
-    body = chance.choice([b"", b"RIFF" + chance.randbytes(200), b"0,1\n" * 100, b"\xff" * 5000])
-    height = chance.choice(["1", "NaN", "x", "-1", "1e999"])
-    part = "--edge\r\nContent-Disposition: form-data; name="
-    table = f'{part}"table"\r\n\r\n{{"height": {height}}}\r\n'
-    file = f'{part}"file"; filename="{name}"\r\n\r\n'
-    form = f"{table}{file}".encode() + body + b"\r\n--edge--\r\n"
-    kind = {"Content-Type": "multipart/form-data; boundary=edge"}
-    return _judged(*_ask(address, "/measure", form, **kind))
 
 
 def _begin(address: str, path: str, body: bytes, sent: int | None = None) -> socket.socket:
