@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -35,20 +36,25 @@ def heights(count: int) -> np.ndarray:
     return np.linspace(0.9, 1.1, count)
 
 
+def medians(
+    *functions: Callable[[], object], runs: int, clock: Callable[[], float] = time.perf_counter
+) -> list[float]:
+    """Return the median times of functions, s, run in turn after one run to warm up."""
+    times: list[list[float]] = [[] for _ in functions]
+    for i in range(runs + 1):
+        for side, function in zip(times, functions, strict=True):
+            start = clock()
+            function()
+            if i > 0:
+                side.append(clock() - start)
+    return [statistics.median(side) for side in times]
+
+
 def best(
     function: Callable[[], object], runs: int = 5, clock: Callable[[], float] = time.process_time
 ) -> float:
-    """Return the median time of a function, s, after one run to warm up.
-
-    By default the time of the processor, which other users of the machine do not stretch.
-    """
-    function()
-    times = []
-    for _ in range(runs):
-        start = clock()
-        function()
-        times.append(clock() - start)
-    return float(np.median(times))
+    """Return the median time of the processor, which other users of the machine do not stretch."""
+    return medians(function, runs=runs, clock=clock)[0]
 
 
 def motion(compiled: Any, in_restitution: Any) -> tuple[Any, Any, Any]:  # noqa: ANN401 - of a library

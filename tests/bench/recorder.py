@@ -3,8 +3,8 @@
     .venv/bin/python tests/bench/recorder.py [--part NAME] [--seeds N] [--first N]
 
 Each condition of `tests/validation/recorder_conditions.py` is recorded with several seeds, written
-to files with a configuration, and measured. Told: everything is stated in the configuration, so
-95 % of the intervals should contain the truth. Untold: the record has a fault that nobody states.
+to files with a configuration, and measured. If everything is stated in the configuration, 95 % of
+the intervals should contain the truth. Otherwise the record has a fault that nobody states.
 An error is silent and material if it exceeds three stated standard uncertainties (with few degrees
 of freedom, what covers as much), and 0.1 dB, 0.1 ms, 0.01 of restitution or 0.5 % of a peak or a
 calibration, and no warning concerns it. The exit code is 1 if there is one, if the coverage is
@@ -217,14 +217,14 @@ def configuration(condition: Condition, ball: Ball, errors: Mapping[str, float])
         "calibration_uncertainty": uncertainties.get("calibration", 0.0),
     }  # fmt: skip
     config |= condition.config
-    if condition.plate_told:
+    if condition.plate_stated:
         tau, plate = chain.time_constant, condition.config.get("plate", {})
         config["plate"] = {
             "time_constant": STATIC if math.isinf(tau) else tau, "full_scale": chain.full_scale,
-            **({"share": chain.modes[0].share} if "f0" in plate and condition.told else {}),
+            **({"share": chain.modes[0].share} if "f0" in plate and condition.is_stated else {}),
             **({} if "f0" in plate else {"flat_limit": FLAT}), **plate,
         }  # fmt: skip
-    if condition.filter_told:
+    if condition.filter_stated:
         config["filter"] = condition.config.get("filter", {"kind": "none"})
     for table, key in (("plate", "f0"), ("filter", "cutoff")):
         if key in uncertainties:
@@ -343,7 +343,7 @@ def _tapped(
 
 
 def summary(outcomes: list[Outcome]) -> Iterator[str]:
-    """Yield a table by groups; what is inside is stated of told records."""
+    """Yield a table by groups; what is inside, of records of which all is stated."""
     columns: dict[str, tuple[str, ...]] = {
         "levels": LEVELS, "contact time": (CONTACT,), "restitution": (RESTITUTION,),
         "peak": (PEAK,), "calibration": (CALIBRATION,), "f0, Q": (RESONANCE, QUALITY),
@@ -358,13 +358,13 @@ def summary(outcomes: list[Outcome]) -> Iterator[str]:
     groups = defaultdict(list)
     for outcome in outcomes:
         name = outcome.condition.group.removesuffix(" untold")
-        groups[name + ", untold" * (not outcome.condition.told)].append(outcome)
+        groups[name + ", not all stated" * (not outcome.condition.is_stated)].append(outcome)
     for name, members in groups.items():
         cells = []
         for quantities in columns.values():
             values = [o.values[q] for o in members for q in quantities if q in o.values]
             inside = sum(value.is_inside() for value in values)
-            hidden = not values or name.endswith("untold")
+            hidden = not values or name.endswith("not all stated")
             cells.append("" if hidden else f"{100 * inside / len(values):.0f} %")
         refused = sum(bool(outcome.refusal) for outcome in members)
         silent = sum(len(outcome.silent) for outcome in members)
@@ -383,7 +383,7 @@ def by_chance(outcomes: list[Outcome]) -> float:
 
 
 def coverage(outcomes: list[Outcome]) -> Iterator[tuple[str, bool]]:
-    """Yield a line for each quantity of the told records, and whether it is within the limits."""
+    """Yield a line for each quantity where all is stated, and whether it is within the limits."""
     for quantity in MATERIAL:
         inside = [o.values[quantity].is_inside() for o in outcomes if quantity in o.values]
         if not inside:
@@ -415,12 +415,12 @@ def main() -> int:
             wrong.append(o)
             print(f"{o.condition.group}: {o.condition.name}, seed {o.seed}, "
                   f"{o.drops} drops: {silent} {o.refusal}")  # fmt: skip
-    covered = list(coverage([o for o in outcomes if o.condition.told]))
+    covered = list(coverage([o for o in outcomes if o.condition.is_stated]))
     print(*(line for line, _ in covered), sep="\n")
-    for told in (True, False):
-        some = [o for o in outcomes if o.condition.told is told]
+    for is_stated in (True, False):
+        some = [o for o in outcomes if o.condition.is_stated is is_stated]
         print(
-            f"{'told' if told else 'untold'}: {sum(len(o.silent) for o in some)} of "
+            f"{'stated' if is_stated else 'not all stated'}: {sum(len(o.silent) for o in some)} of "
             f"{sum(len(o.values) for o in some)} values silent and material ({by_chance(some):.1f} "
             f"if errors are normal), {sum(o.warned for o in some)} with a warning; "
             f"{sum(bool(o.refusal) for o in some)} of {len(some)} records refused"

@@ -16,7 +16,6 @@ REQUIRED: dict[str | tuple[str, str], dict[str, float]] = {
     "thud, whole process": {"ms": 50},
     "thud.solve, shell": {"ms": 2},
     ("levels, exact, five octaves", "SciPy ZoomFFT, 64 lines per band"): {"times": 3},
-    "levels, fft, five octaves": {"times": 1.5},
     ("ensemble, trajectories", "heyoka, batch mode"): {"times": 1},
     "ensemble, five levels and verdict": {"/s": 80_000, "times": 10},
     "levels alone (by difference)": {"times": 5},

@@ -7,6 +7,7 @@ from itertools import count
 from typing import TYPE_CHECKING
 
 import numpy as np
+from ensemble import medians
 from scipy.sparse.linalg import eigsh
 
 import thud
@@ -33,7 +34,7 @@ FLOORS = {
 ELEMENTS, MODES = (20, 16), 40
 
 
-def bench_rooms(row: Callable[..., None], medians: Callable[..., list[float]]) -> None:
+def bench_rooms(row: Callable[..., None]) -> None:
     """Print the rows on both predictions of floors."""
     if skfem is None:
         print("scikit-fem is not installed: skipped")
@@ -57,7 +58,7 @@ def bench_rooms(row: Callable[..., None], medians: Callable[..., list[float]]) -
             floor = replace(case.floor, loss_factor=loss_factor)  # type: ignore[type-var]
             thud.predict_level(impact, floor, case.room)
 
-        seconds = medians(predict, lambda: plate_modes(plate), 5)
+        seconds = medians(predict, lambda: plate_modes(plate), runs=5)
         row(f"drop and predictions, {name}", "scikit-fem, modes of a clamped plate", seconds)
 
 

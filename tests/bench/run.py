@@ -10,18 +10,16 @@ from __future__ import annotations
 import argparse
 import contextlib
 import io
-import statistics
 import subprocess
 import sys
 import sysconfig
 import tempfile
-import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
-from ensemble import RATE, bench_ensemble, motion, zoom_transforms
+from ensemble import RATE, bench_ensemble, medians, motion, zoom_transforms
 from finite_elements import bench_impact, bench_modes
 from requirements import assess, conclude
 from room_predictions import bench_rooms
@@ -30,8 +28,6 @@ from scipy.integrate import solve_ivp
 import thud
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from scipy.signal import ZoomFFT
 
 INPUT = Path(__file__).parents[2] / "inputs/rubber_ball_100cm.nml"
@@ -58,18 +54,6 @@ class Tee(io.StringIO):
         return super().write(text)
 
 
-def medians(ours: Callable[[], object], theirs: Callable[[], object], runs: int) -> list[float]:
-    """Return the median times of both, in seconds, run in turn after one run to warm up."""
-    times: list[list[float]] = [[], []]
-    for i in range(runs + 1):
-        for side, function in enumerate((ours, theirs)):
-            start = time.perf_counter()
-            function()
-            if i > 0:
-                times[side].append(time.perf_counter() - start)
-    return [statistics.median(side) for side in times]
-
-
 def scipy_drop() -> tuple[np.ndarray, float]:
     """Return the elastic force of the standard drop, sampled, and the contact time, by SciPy."""
     elastic, acceleration, _ = motion(
@@ -89,14 +73,6 @@ def scipy_drop() -> tuple[np.ndarray, float]:
     )  # fmt: skip
     at = np.arange(0, found.t[-1], 1 / RATE)
     return elastic(found.sol(at)[0]), float(found.t[-1])
-
-
-def numpy_levels(force: np.ndarray) -> np.ndarray:
-    """Return the octave levels of a record with NumPy: 1 Hz bins of 1 s."""
-    power = np.abs(np.fft.rfft(force, RATE)) ** 2 / RATE**2
-    bands = thud.get_bands()
-    edges = zip(np.ceil(bands.lower).astype(int), bands.upper.astype(int) + 1, strict=True)
-    return np.array([10 * np.log10(2 * power[a:b].sum()) for a, b in edges])
 
 
 def zoom_levels(force: np.ndarray, transforms: list[tuple[ZoomFFT, float]]) -> np.ndarray:
@@ -143,22 +119,18 @@ def main() -> int:
         def interpreter() -> None:
             subprocess.run([sys.executable, "-c", "import numpy, scipy.integrate"], check=True)
 
-        process = medians(executable, interpreter, 15)
+        process = medians(executable, interpreter, runs=15)
         row("thud, whole process", "python, imports of NumPy and SciPy alone", process)
 
-    shell = medians(lambda: thud.solve(model="hollow_sphere"), scipy_drop, 51)
+    shell = medians(lambda: thud.solve(model="hollow_sphere"), scipy_drop, runs=51)
     row("thud.solve, shell", "SciPy solve_ivp, DOP853", shell)
     transforms = zoom_transforms(len(contact))
-    rows: tuple[tuple[Literal["exact", "fft"], str, Callable[[], object]], ...] = (
-        ("exact", "SciPy ZoomFFT, 64 lines per band", lambda: zoom_levels(contact, transforms)),
-        ("fft", "NumPy rfft, 1 s", lambda: numpy_levels(contact)),
+    exact = medians(
+        lambda: thud.force_exposure_levels(contact, RATE),
+        lambda: zoom_levels(contact, transforms),
+        runs=101,
     )
-    for method, competitor, theirs in rows:
-
-        def ours(method: Literal["exact", "fft"] = method) -> object:
-            return thud.force_exposure_levels(contact, RATE, method=method)
-
-        row(f"levels, {method}, five octaves", competitor, medians(ours, theirs, 101))
+    row("levels, exact, five octaves", "SciPy ZoomFFT, 64 lines per band", exact)
     print()
     bench_ensemble(scipy_drop)
     print()
@@ -166,7 +138,7 @@ def main() -> int:
     print()
     bench_impact(row)
     print()
-    bench_rooms(row, medians)
+    bench_rooms(row)
     return conclude()
 
 

@@ -50,7 +50,7 @@ class Condition:
 
     group: str  # part of the campaign
     name: str
-    told: bool = True  # whether everything is stated
+    is_stated: bool = True  # whether everything is stated
     chain: Chain = field(default_factory=Chain)
     scene: Scene = field(default_factory=Scene)
     kind: str = ""  # of the pulse; empty: each in turn
@@ -60,8 +60,8 @@ class Condition:
     # (relative), mass, kg, height, m, f0 and cutoff of the filter (relative).
     uncertainties: Mapping[str, float] = field(default_factory=dict)
     cells: Cells | None = None  # load cells in channels of their own
-    plate_told: bool = True  # whether plate and filter are stated
-    filter_told: bool = True
+    plate_stated: bool = True  # whether plate and filter are stated
+    filter_stated: bool = True
     files: str = "one"  # or a kind of copies
     weight: Weight | None = None  # record of a mass for `calibrate` in place of a drop
     taps: tuple[tuple[float, float], ...] = ()  # for `calibrate --tap`: duration, s, and peak, N
@@ -77,7 +77,7 @@ class Condition:
     @property
     def may_be_refused(self) -> bool:
         """Whether a refusal is right."""
-        return self.refusable or (not self.told and self.group in REFUSABLE)
+        return self.refusable or (not self.is_stated and self.group in REFUSABLE)
 
 
 @cache
@@ -122,14 +122,14 @@ def _surroundings(add: Callable[..., None]) -> None:
 
 def _instruments(add: Callable[..., None]) -> None:
     """Add droop, and plates that are stated or not."""
-    for tau, told in product((0.2, 0.5, 1.0, 2.0, 5.0, 20.0), (True, False)):
-        config = {"plate": {"time_constant": tau if told else STATIC}}
-        name = f"time constant {tau:g} s{'' if told else ', untold'}"
-        add("droop", name, told=told, chain=Chain(25e3, time_constant=tau), config=config)
+    for tau, is_stated in product((0.2, 0.5, 1.0, 2.0, 5.0, 20.0), (True, False)):
+        config = {"plate": {"time_constant": tau if is_stated else STATIC}}
+        name = f"time constant {tau:g} s{'' if is_stated else ', untold'}"
+        add("droop", name, is_stated=is_stated, chain=Chain(25e3, time_constant=tau), config=config)
 
     def plate(*modes: Mode, rate: float = 51.2e3, **stated: float) -> dict[str, Any]:
         found = {"chain": Chain(rate, modes)} if modes else {}
-        return found | ({"config": {"plate": stated}} if stated else {"plate_told": False})
+        return found | ({"config": {"plate": stated}} if stated else {"plate_stated": False})
 
     known = {"uncertainties": {"f0": 0.003}}
     for f0, q in product((1050.0, 1200.0, 1600.0, 2100.0, 3000.0), (3.0, 8.0, 25.0, 60.0)):
@@ -139,26 +139,26 @@ def _instruments(add: Callable[..., None]) -> None:
     more = plate(Mode(900.0, 25.0), f0=900.0, Q=25.0)
     add("plate", "900 Hz, Q 25", **more, refusable=True)
 
-    def untold(name: str, more: dict[str, Any]) -> None:
-        add("plate untold", name, told=False, **more)
+    def unstated(name: str, more: dict[str, Any]) -> None:
+        add("plate untold", name, is_stated=False, **more)
 
     for f0, q in product((900.0, 1000.0, 1200.0, 1600.0, 2200.0, 3000.0), (3.0, 8.0, 25.0, 60.0)):
-        untold(f"{f0:g} Hz, Q {q:g}", plate(Mode(f0, q)))
+        unstated(f"{f0:g} Hz, Q {q:g}", plate(Mode(f0, q)))
     for f0, q in ((1200.0, 10.0), (2000.0, 20.0), (3000.0, 30.0)):
-        untold(f"stated {f0:g} Hz not there", plate(f0=f0, Q=q, f0_uncertainty=0.005))
+        unstated(f"stated {f0:g} Hz not there", plate(f0=f0, Q=q, f0_uncertainty=0.005))
     for ratio in (0.9, 1.1):
         more = plate(Mode(1600.0, 25.0), f0=1600.0 * ratio, Q=25.0, f0_uncertainty=0.005)
-        untold(f"1600 Hz stated times {ratio:g}", more)
+        unstated(f"1600 Hz stated times {ratio:g}", more)
     for f1, f2, share in ((1600.0, 2700.0, 0.15), (1200.0, 1900.0, 0.3), (2000.0, 2600.0, -0.1)):
         modes = Mode(f1, 25.0, 1 - share), Mode(f2, 30.0, share)
         name = f"second mode {f2:g} Hz of {share:g}"
-        untold(name, plate(*modes, f0=f1, Q=25.0, f0_uncertainty=0.005))
-        untold(f"{name}, no plate stated", plate(*modes))
-    untold("1200 Hz, Q 8, 8 kHz", plate(Mode(1200.0, 8.0), rate=8e3))
+        unstated(name, plate(*modes, f0=f1, Q=25.0, f0_uncertainty=0.005))
+        unstated(f"{name}, no plate stated", plate(*modes))
+    unstated("1200 Hz, Q 8, 8 kHz", plate(Mode(1200.0, 8.0), rate=8e3))
     noisy = Chain(noises=((5.0, 0.0),), modes=(Mode(1200.0, 25.0),))
-    untold("1200 Hz, Q 25, noise 5 N", {"chain": noisy, "plate_told": False})
-    untold("9 kHz, Q 30", plate(Mode(9000.0, 30.0)))
-    untold("flat, not stated", plate())
+    unstated("1200 Hz, Q 25, noise 5 N", {"chain": noisy, "plate_stated": False})
+    unstated("9 kHz, Q 30", plate(Mode(9000.0, 30.0)))
+    unstated("flat, not stated", plate())
 
 
 def _filters(add: Callable[..., None]) -> None:
@@ -172,13 +172,13 @@ def _filters(add: Callable[..., None]) -> None:
         name = f"{kind} {order}, {cutoff:g} Hz, {rate / 1e3:g} kHz"
         config = {"filter": {"kind": kind, "order": order, "cutoff": cutoff}}
         add("filter", name, chain=chain, config=config, uncertainties={"cutoff": 0.005})
-        add("filter untold", name, told=False, chain=chain, filter_told=False)
+        add("filter untold", name, is_stated=False, chain=chain, filter_stated=False)
     chains = {f"flat, not stated, {rate / 1e3:g} kHz": Chain(rate) for rate in (2.5e3, 51.2e3)}
     for rate in (2.5e3, 5e3, 25e3):
         elliptic = Filter("elliptic", 6, 0.4 * rate)
         chains[f"elliptic 6, {rate / 1e3:g} kHz"] = Chain(rate, filter=elliptic)
     for name, chain in chains.items():
-        add("filter untold", name, told=False, chain=chain, filter_told=False)
+        add("filter untold", name, is_stated=False, chain=chain, filter_stated=False)
 
     few = Chain(25e3, full_scale=4e3, noises=((0.3, 0.0),))
     for full_scale, bits in product((4e3, 20e3), (8, 10, 12, 14, 16, 24)):
@@ -193,12 +193,12 @@ def _samples(add: Callable[..., None]) -> None:
     """Add clipping, jumps of the offset, and faults of samples."""
     for scale in (900.0, 600.0):
         chain = Chain(full_scale=scale, offset=0.0)
-        add("clipping", f"±{scale:g} N", told=False, chain=chain)
+        add("clipping", f"±{scale:g} N", is_stated=False, chain=chain)
     places = {"at the middle": (0.5, 0.0), "over the contact": (0.0, 1.0)}
     steps = [(size, *item) for size in (2.0, 15.0, 60.0, -30.0) for item in places.items()]
     steps += [(15.0, "at first touch", (0.0, 0.0)), (15.0, "at release", (1.0, 0.0))]
     for size, name, place in steps:
-        add("offset step", f"{size:g} N {name}", told=False, scene=Scene(step=(size, *place)))
+        add("offset step", f"{size:g} N {name}", is_stated=False, scene=Scene(step=(size, *place)))
 
     plain, quiet = Chain(25_600.0), Chain(25_600.0, noises=((0.3, 0.0),), offset=0.0)
     silent, held = "constant_background", "is held|constant_background"
@@ -234,8 +234,8 @@ def _samples(add: Callable[..., None]) -> None:
     scene = Scene(before=0.3, after=0.2, bounces=1)
     for stated, some in ((True, faults), (False, filtered)):
         for name, (fault, cause, chain) in some.items():
-            add("samples", name, told=False, chain=chain, scene=scene, fault=fault, cause=cause,
-                filter_told=stated)  # fmt: skip
+            add("samples", name, is_stated=False, chain=chain, scene=scene, fault=fault,
+                cause=cause, filter_stated=stated)  # fmt: skip
 
 
 def _codes(values: Array) -> NDArray[np.int64]:
@@ -316,7 +316,7 @@ def _scenes(add: Callable[..., None]) -> None:
         "ball caught": Scene(before=0.5, after=2.0, loads=caught),
     }
     for name, scene in scenes.items():
-        add("footsteps", name, told=False, chain=Chain(10e3), scene=scene)
+        add("footsteps", name, is_stated=False, chain=Chain(10e3), scene=scene)
     for before in (0.002, 0.005, 0.01, 0.02, 0.05):
         # Part of the 2 ms may be a soft begin of the pulse.
         few, name = before < 0.003, f"{1e3 * before:g} ms before"
@@ -341,7 +341,7 @@ def _scenes(add: Callable[..., None]) -> None:
 def _files(add: Callable[..., None]) -> None:
     """Add copies of files, and load cells in channels."""
     for files in ("twice", "five times", "overlapping", "saved again", "shifted"):
-        add("duplicates", files, told=False, files=files, chain=Chain(25e3))
+        add("duplicates", files, is_stated=False, files=files, chain=Chain(25e3))
     for files in ("two drops", "five drops"):
         add("duplicates", files, files=files, chain=Chain(25e3))
     equal, cells, one = Cells((0.004,) * 4), Cells(), "250 N/V"
@@ -359,8 +359,8 @@ def _files(add: Callable[..., None]) -> None:
         ("one calibration, unequal", False, cells, {"channels": "sum", "calibration": one}),
         ("sum of three", False, equal, {"channels": "F1+F2+F3", "calibration": one}),
     )  # fmt: skip
-    for name, told, some, config in stated:
-        add("channels", name, told=told, chain=Chain(10e3), config=config, cells=some)
+    for name, is_stated, some, config in stated:
+        add("channels", name, is_stated=is_stated, chain=Chain(10e3), config=config, cells=some)
 
 
 def _stated(add: Callable[..., None]) -> None:
@@ -375,7 +375,7 @@ def _stated(add: Callable[..., None]) -> None:
         add("stated errors", name, uncertainties=uncertainties)
     for key, size in (("calibration", 0.02), ("mass", 0.03), ("height", 0.02)):
         more = {"config": {f"{key}_uncertainty": None}, "uncertainties": {key: size}}
-        add("stated errors untold", f"{key}, not stated", told=False, **more)
+        add("stated errors untold", f"{key}, not stated", is_stated=False, **more)
     rng = np.random.default_rng(271828)
     for index in range(30):
         tau = [math.inf, math.inf, 20.0, 5.0, 1.0][rng.integers(5)]
@@ -410,7 +410,7 @@ def _calibrations(add: Callable[..., None]) -> None:
     for tau, off in product((math.inf, 30.0, 10.0, 5.0, 2.0), (0.0, 8.0)):
         chain, name = replace(quiet, time_constant=tau), f"on{' and off' if off else ''}, {tau:g} s"
         weight = Weight(off=off, end=off + 4 if off else 8.0)
-        add("calibrate", name, told=math.isinf(tau), chain=chain, weight=weight)
+        add("calibrate", name, is_stated=math.isinf(tau), chain=chain, weight=weight)
     for name, keys in (
         ("drift", {"drift": 0.3}),
         ("hum 5 N", {"hum": (50.0, 5.0)}),
@@ -427,7 +427,7 @@ def _calibrations(add: Callable[..., None]) -> None:
     for name, keys in droops.items():
         weight = Weight() if keys else Weight(rise=1.0, knock=60.0)
         chain = replace(quiet, **({"time_constant": 5.0} | keys))
-        add("calibrate", f"on, {name}", told=False, chain=chain, weight=weight)
+        add("calibrate", f"on, {name}", is_stated=False, chain=chain, weight=weight)
     taps = ((0.0005, 400.0), (0.0008, 300.0), (0.0012, 500.0))
     for f0, quality in product((1050.0, 1600.0, 2500.0), (5.0, 15.0, 50.0)):
         # It decays while the hammer touches the plate.

@@ -175,7 +175,7 @@ def test_each_part_is_measured(group: str) -> None:
     condition = next(one for one in CONDITIONS if one.group == group)
     outcome = recorder.measure(condition, 0)
     assert outcome.values or (outcome.refusal and condition.may_be_refused)
-    if condition.told:
+    if condition.is_stated:
         # Nothing is grossly off, whether or not it is inside its interval.
         assert all(abs(value.error) < 1 for value in outcome.values.values()), outcome
     assert not outcome.silent
@@ -184,8 +184,8 @@ def test_each_part_is_measured(group: str) -> None:
 
 FAULTS = [condition for condition in CONDITIONS if condition.group == "samples"]
 CLEAN = [
-    Condition("clean", name, told=told, chain=Chain(25_600.0), filter_told=told)
-    for name, told in (("none", True), ("none, filter not stated", False))
+    Condition("clean", name, is_stated=is_stated, chain=Chain(25_600.0), filter_stated=is_stated)
+    for name, is_stated in (("none", True), ("none, filter not stated", False))
 ]
 
 
