@@ -39,13 +39,9 @@ MODELS = ("hollow_sphere", "modal_ball", "finite_element")
 
 def outcome(processor: str) -> dict[str, object]:
     """Return levels and compiler of the library for a kind of processor, the best for the best."""
-    done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", f"MODELS = {MODELS}\n{LEVELS}"],
-        check=True,
-        capture_output=True,
-        text=True,
-        env={**os.environ, "GLIBC_TUNABLES": f"glibc.cpu.hwcaps={HIDDEN[processor]}"},
-    )
+    environment = {**os.environ, "GLIBC_TUNABLES": f"glibc.cpu.hwcaps={HIDDEN[processor]}"}
+    command = [sys.executable, "-W", "ignore", "-c", f"MODELS = {MODELS}\n{LEVELS}"]
+    done = subprocess.run(command, check=True, capture_output=True, text=True, env=environment)
     found = json.loads(done.stdout)
     assert isinstance(found, dict)
     return found
@@ -53,8 +49,8 @@ def outcome(processor: str) -> dict[str, object]:
 
 def supported() -> list[str]:
     """Return the kinds that this processor is, best first."""
-    told = subprocess.run([LOADER, "--help"], check=True, capture_output=True, text=True).stdout
-    lines = [line.split() for line in told.splitlines() if "(supported" in line]
+    shown = subprocess.run([LOADER, "--help"], check=True, capture_output=True, text=True).stdout
+    lines = [line.split() for line in shown.splitlines() if "(supported" in line]
     return [kind for kind in HIDDEN if kind == "x86-64" or [kind] in [line[:1] for line in lines]]
 
 
@@ -99,21 +95,17 @@ def test_kinds_of_processor_agree() -> None:
 
 def test_a_newcomer_gets_a_figure_and_a_verdict(tmp_path: Path) -> None:
     def driver(*arguments: str) -> str:
-        done = subprocess.run(
-            [SCRIPTS / "thud-driver", *arguments],
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            check=True,
-        )
-        return done.stdout
+        command = [SCRIPTS / "thud-driver", *arguments]
+        return subprocess.run(
+            command, cwd=tmp_path, capture_output=True, text=True, check=True
+        ).stdout
 
     driver("examples")
     driver("run", "inputs/rubber_ball_100cm.nml")
     assert (tmp_path / "outputs/rubber_ball_100cm/levels.svg").stat().st_size > 10_000
     recordings = sorted(map(str, (tmp_path / "inputs/recordings").glob("drop_*.wav")))
-    told = driver("measure", *recordings, "--config", "inputs/recordings/lab.toml")
-    assert "does not conform" in told
+    printed = driver("measure", *recordings, "--config", "inputs/recordings/lab.toml")
+    assert "does not conform" in printed
 
 
 def test_wheel_holds_the_calibrated_sets() -> None:
