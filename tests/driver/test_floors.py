@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-import warnings
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -33,7 +32,7 @@ COUPLED: dict[str, ModelOptions] = {
     "hollow_sphere": thud.HollowSphere(), "modal_ball": thud.ModalBall(),
     "two_mass": thud.TwoMass(),
     "hunt_crossley": thud.HuntCrossley(contact_time=0.02),
-    "finite_element": thud.FiniteElement(radial_elements=2, polar_elements=24, snapshot_interval=0),
+    "finite_element": thud.FiniteElement(radial_elements=2, polar_elements=24),
 }  # fmt: skip
 FLOORS: dict[str, FloorOptions] = {
     "infinite_plate": LIGHT,
@@ -124,28 +123,13 @@ def test_mobility_is_that_of_the_closed_form(oracle: Callable[..., None]) -> Non
     assert thud.mobility(thud.Rigid(), 50.0).values == pytest.approx([0.0])
 
 
-@pytest.mark.parametrize("model", ["hollow_sphere", "finite_element"])
-def test_results_on_a_floor_are_read_back(run: Run, case_file: CaseFile, model: str) -> None:
-    options = "radial_elements = 2\n polar_elements = 24" if model == "finite_element" else ""
-    mesh = f"&mesh\n {options}\n/\n&output snapshot_interval = 1e-3 /\n" if options else ""
-    text = f"&model name = '{model}' /\n{mesh}&floor name = 'oscillator' /\n"
-    done = run(case_file(text), "-o", "out", "--all")
+def test_results_on_a_floor_are_written_and_shown(run: Run, case_file: CaseFile) -> None:
+    case = case_file("&model name = 'hollow_sphere' /\n&floor name = 'oscillator' /\n")
+    done = run(case, "-o", "out")
     assert done.returncode == 0, done.stderr
-    folder = case_file(text).parent / "out"
-    found = thud.read_results(folder)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", thud.PlausibilityWarning)
-        expected = thud.solve(found.case)
-    moved, wanted = found.on_floor, expected.on_floor
+    moved = thud.read_results(case.parent / "out").on_floor
     assert moved is not None
-    assert wanted is not None
-    for field in fields(wanted):
-        if field.name != "motion":
-            np.testing.assert_equal(getattr(moved, field.name), getattr(wanted, field.name))
-    if wanted.motion:
-        assert moved.motion is not None
-        np.testing.assert_equal(vars(moved.motion), vars(wanted.motion))
-    with (folder / "floor_levels.csv").open(encoding="utf-8") as file:
+    with (case.parent / "out/floor_levels.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     energy = moved.injected_energy()
     for name, values in {
