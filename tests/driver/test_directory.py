@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -128,9 +128,6 @@ def test_full_disk_is_reported_and_loses_nothing(
     assert values(thud.sweep(tmp_path / "long.toml", tmp_path).dataset).identical(values(whole))
 
 
-OTHER = {"parameters": {"height": {"values": [1]}}}
-
-
 @pytest.mark.parametrize(
     ("name", "words"),
     [("a.nc", ["[parameters] height", "(0.5, 1.0)", "(1.0,)"]), ("b.nc", []), ("c.nc", []),
@@ -149,7 +146,7 @@ def test_results_of_another_study_are_not_touched(
         place /= "block_000000000000.nc"
     path.rename(place)
     before = place.read_bytes()
-    study = {"name": name[0], **OTHER}
+    study = {"name": name[0], "parameters": {"height": {"values": [1]}}}
     with pytest.raises(thud.InputError, match=naming(name, *words, "--replace")):
         thud.sweep(study, tmp_path)
     assert place.read_bytes() == before
@@ -162,7 +159,7 @@ def test_half_a_block_is_no_result(tmp_path: Path) -> None:
     (tmp_path / "e.partial/.block_000000000000.nc.1.new").write_text("")
     with pytest.raises(thud.InputError, match=naming("e.partial", "samples")):
         thud.read_sweep(tmp_path / "e.partial")
-    assert thud.sweep({"name": "e", **OTHER}, tmp_path).dataset.sizes["height"] == 1
+    assert thud.sweep({"name": "e", **HEIGHTS}, tmp_path).dataset.sizes["height"] == 2
     assert not (tmp_path / "e.partial").exists()
 
 
@@ -193,23 +190,18 @@ def test_links_in_the_place_of_results_are_not_followed(name: str, tmp_path: Pat
 @pytest.mark.parametrize(
     ("name", "content"),
     [("python.nc", "paper.txt"), ("python.nc", "block_000000000000.nc"),
-     ("python.partial", "block_000000000000.nc")],
+     ("python.partial", "block_000000000000.nc"), ("python.partial", "paper.txt")],
 )  # fmt: skip
 def test_directories_of_something_else_stay(name: str, content: str, tmp_path: Path) -> None:
     (tmp_path / "mine").write_text("mine")
     (tmp_path / name).mkdir()
     (tmp_path / name / content).symlink_to(tmp_path / "mine")
     for replace in (False, True):
-        with pytest.raises(thud.InputError, match=naming(name)):
+        # Other files beside blocks stay, too.
+        is_refused = (name, content) != ("python.partial", "paper.txt")
+        with pytest.raises(thud.InputError, match=naming(name)) if is_refused else nullcontext():
             thud.sweep(HEIGHTS, tmp_path, replace=replace)
     assert (tmp_path / name / content).read_text() == "mine"
-
-
-def test_other_files_in_the_directory_of_blocks_stay(tmp_path: Path) -> None:
-    (tmp_path / "python.partial").mkdir()
-    (tmp_path / "python.partial/paper.txt").write_text("mine")
-    thud.sweep(HEIGHTS, tmp_path, replace=True)
-    assert (tmp_path / "python.partial/paper.txt").read_text() == "mine"
 
 
 def test_results_of_this_version_stay_with_replace(

@@ -15,15 +15,6 @@ from thud.impact.contact_time import contact_span
 from thud.level.levels import peak_count
 
 
-def test_arrays_share_one_clock() -> None:
-    impact = thud.solve(sample_rate=48000.0, duration=0.03, model="hollow_sphere")
-    assert impact.time.shape == (1440,)
-    assert impact.time[1] == 1 / 48000
-    for array in impact.histories().values():
-        assert array.shape == impact.time.shape
-        assert array.dtype == np.float64
-
-
 def test_forces_add_up(shell: thud.Impact) -> None:
     components = shell.components
     elastic = components["shell_force"] + components["gas_force"]
@@ -116,7 +107,9 @@ def test_arguments_of_a_drop_are_keys_of_its_case() -> None:
     )
     assert impact.case.sampling == thud.Sampling(48000.0, 0.04, 9)
     assert (impact.case.ball, impact.case.drop) == (ball, drop)
-    assert len(impact.time) == 0.04 * 48000
+    assert impact.time[1] == 1 / 48000
+    for array in (impact.time, *impact.histories().values()):
+        assert (array.shape, array.dtype) == ((1920,), np.float64)
     default = thud.solve(model="hollow_sphere")
     assert default.case == thud.Case(model=thud.HollowSphere())
     # Free modes and compression of a case have functions of their own.

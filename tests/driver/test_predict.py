@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import MINIMAL, REPOSITORY, names_in
-from markupsafe import escape
+from conftest import REPOSITORY, names_in
 from test_figure_look import assert_clean
 
 import thud
@@ -205,13 +204,10 @@ def test_changes_are_predictions_of_the_changed_floor(floor: PredictedFloor) -> 
     deck, room = prediction.floor, prediction.room
     assert isinstance(deck, thud.Plate)
     thick = thud.predict_level(floor=replace(deck, thickness=0.19), room=room)
-    assert changes["bearing plate +10 mm"] == pytest.approx(
-        thick.rating.level - prediction.rating.level
-    )
+    level = prediction.rating.level
+    assert changes["bearing plate +10 mm"] == pytest.approx(thick.rating.level - level)
     long = thud.predict_level(floor=deck, room=replace(room, reverberation_time=1.0))
-    assert changes["reverberation time doubled"] == pytest.approx(
-        long.rating.level - prediction.rating.level
-    )
+    assert changes["reverberation time doubled"] == pytest.approx(long.rating.level - level)
     assert {"floating plate +10 mm", "mass of the ceiling doubled"} < changes.keys()
     sizes = [*map(abs, changes.values())]
     assert sizes == sorted(sizes, reverse=True)
@@ -264,14 +260,6 @@ def test_layers_of_a_case_are_those_of_its_keys(plate: thud.Plate, materials: li
     assert_clean(draw_levels(floor.prediction))
 
 
-def test_hostile_names_are_text(floor: PredictedFloor, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(PredictedFloor, "changes", ())
-    name = '<script>alert("a&b")</script>'
-    page = floor_page(replace(floor, name=name), b"", b"")
-    assert "<script>" not in page
-    assert str(escape(name)) in page
-
-
 def test_workbook_has_every_table(floor: PredictedFloor) -> None:
     openpyxl = pytest.importorskip("openpyxl")
     files = contents([replace(floor, name="=1+1")], Path(), report=False)
@@ -287,18 +275,6 @@ def test_workbook_has_every_table(floor: PredictedFloor) -> None:
     assert rows == [("=1+1", *row) for row in floor.assumptions[1:]]
     texts = [row[1] for row in book["warnings"].iter_rows(min_row=2, values_only=True)]
     assert texts == list(map(str, floor.prediction.notes))
-
-
-@pytest.mark.parametrize("name", ["../evil", ".hidden"])
-def test_names_of_cases_stay_in_the_directory(name: str, tmp_path: Path) -> None:
-    (tmp_path / "case.nml").write_text(
-        f"&case name = '{name}' /\n{MINIMAL}&floor name = 'plate' /\n"
-        "&room reverberation_time = 0.05 /\n"
-    )
-    before = {*tmp_path.iterdir()}
-    out = tmp_path / "out"
-    cli.main(["predict", str(tmp_path / "case.nml"), "-q", "-o", str(out)])
-    assert {*tmp_path.iterdir()} <= {*before, out}
 
 
 def test_source_that_does_not_conform_is_beside_the_rating_and_digits_are_few() -> None:

@@ -25,7 +25,6 @@ sys.path.insert(0, str(REPOSITORY / "tests/faults"))
 from injection import can_inject, injecting
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
 
     from conftest import CaseFile, Run
@@ -147,7 +146,7 @@ def test_runs_into_one_directory_do_not_mix(
 @pytest.mark.skipif(not can_inject(), reason="there is no C compiler")
 @pytest.mark.parametrize("exchange", [True, False], ids=["exchange", "two renames"])
 @pytest.mark.parametrize(
-    "action", ["kill", *(pytest.param(a, marks=pytest.mark.slow) for a in ("int", errno.EIO))]
+    "action", ["kill", *(pytest.param(a, marks=pytest.mark.slow) for a in ("int", errno.ENOSPC))]
 )
 def test_old_or_new_results_are_whole_whichever_call_fails(  # noqa: PLR0913
     run: Run, two_inputs: TwoInputs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
@@ -163,48 +162,21 @@ def test_old_or_new_results_are_whole_whichever_call_fails(  # noqa: PLR0913
                 patch.setenv(name, value)
             if not exchange:
                 patch.setenv("FAULT_NO_EXCHANGE", "1")
-            status = run("b/case.nml", "-q", "-o", "o").returncode
+            done = run("b/case.nml", "-q", "-o", "o")
+        status = done.returncode
         whole = tmp_path / ("o" if (tmp_path / "o").exists() else "o.old")
         assert contents(whole) in two_inputs.values()
         if whole.name == "o.old":
             whole.rename(tmp_path / "o")
         shutil.rmtree(tmp_path / "o.old", ignore_errors=True)
         if isinstance(action, int):
+            assert not status or "No space left on device" in done.stderr
             # What cannot be removed may stay.
             assert len(list(tmp_path.glob(".o.*.new"))) <= 1
         for path in tmp_path.glob(".o.*.new"):
             shutil.rmtree(path)
         assert run("a/case.nml", "-o", "o").returncode == 0
     assert at > 10
-
-
-@pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """Return a disk of 600 kB, enough for one set of files."""
-    place = tmp_path / "disk"
-    place.mkdir()
-    command = ["mount", "-t", "tmpfs", "-o", "size=600k", "tmpfs", str(place)]
-    if (
-        os.geteuid() != 0
-        or not shutil.which("mount")
-        or subprocess.run(command, capture_output=True, check=False).returncode
-    ):
-        pytest.skip("no disk can be mounted here")
-    yield place
-    subprocess.run(["umount", str(place)], check=True)  # noqa: S607
-
-
-def test_full_disk_keeps_the_old_results(run: Run, two_inputs: TwoInputs, small_disk: Path) -> None:
-    assert run("a/case.nml", "-o", small_disk / "out").returncode == 0
-    result = run("b/case.nml", "-o", small_disk / "out")
-    assert result.returncode == 1
-    assert "No space left on device" in result.stderr
-    assert contents(small_disk / "out") == two_inputs["a"]
-    assert names_in(small_disk) == ["out"]
-    # The disk itself cannot be exchanged for a directory beside it.
-    result = run("b/case.nml", "-o", small_disk, "--replace")
-    assert result.returncode == 1
-    assert names_in(small_disk) == ["out"]
 
 
 def test_results_are_read_back(run: Run, case_file: CaseFile, tmp_path: Path) -> None:
