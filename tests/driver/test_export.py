@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from conftest import REPOSITORY, codes, names_in
-from recording_files import opened
+from recording_files import DURATION, PEAK, opened
 from scipy.io import loadmat
 from synthetic import make_recording
 
@@ -27,7 +27,6 @@ soundfile = pytest.importorskip("soundfile", reason="the extra recordings is not
 
 IMPACT = thud.solve()
 FORCE = blocked_force(IMPACT)
-PEAK, DURATION = 1500.0, 0.02
 CASE = str(REPOSITORY / "inputs/rubber_ball_100cm.nml")
 
 

@@ -21,9 +21,8 @@ MASS = 2.5
 @pytest.fixture(scope="module")
 def linear() -> thud.BallImpedance:
     """Return the impedance of a mass on a spring."""
-    impact = thud.solve(
-        thud.Ball(mass=MASS), model="hunt_crossley", stiffness=STIFFNESS, exponent=1.0
-    )
+    ball = thud.Ball(mass=MASS)
+    impact = thud.solve(ball, model="hunt_crossley", stiffness=STIFFNESS, exponent=1.0)
     return thud.ball_impedance(impact, resistance=[1e3, 1e4, 1e5])
 
 
@@ -52,13 +51,8 @@ def test_linear_source_has_its_closed_form(
             change = 10 * np.log10(np.vdot(moved, moved).real / np.vdot(blocked, blocked).real)
             # 64 lines in a band, and samples of a force that ends with an edge.
             assert abs(linear.estimate[i, j] - expected) < 3e-3 * abs(expected)
-            oracle(
-                "mass on a spring on a resistance: change of octaves",
-                "closed form",
-                linear.change[i, j] - change,
-                2e-3,
-                "dB",
-            )
+            what = "mass on a spring on a resistance: change of octaves"
+            oracle(what, "closed form", linear.change[i, j] - change, 2e-3, "dB")
 
 
 def test_all_levels_of_a_linear_source_change_alike(linear: thud.BallImpedance) -> None:

@@ -20,11 +20,6 @@ MISFIT = {"finite_element": 1.0, "modal_ball": 1.1}
 ROUNDING = 0.02
 
 
-def default_ball(model: str) -> dict[str, float]:
-    keys = [key for key in calibrate.FREE[model] if key != "friction"]
-    return {key: STANDARD_BALL[model, key] for key in keys}
-
-
 @pytest.mark.parametrize("model", calibrate.MODELS)
 def test_sets_agree_with_the_standards(model: str) -> None:
     sets = calibrated_set(model)
@@ -40,7 +35,7 @@ def test_sets_agree_with_the_standards(model: str) -> None:
 
 @pytest.mark.parametrize("model", calibrate.MODELS)
 def test_default_is_the_least_misfit(model: str) -> None:
-    ball = default_ball(model)
+    ball = {k: STANDARD_BALL[model, k] for k in calibrate.FREE[model] if k != "friction"}
     changed = [
         {**ball, key: min(value * factor, calibrate.FREE[model][key][2])}
         for key, value in ball.items()

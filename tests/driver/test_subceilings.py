@@ -55,13 +55,8 @@ def test_stiff_fastening_of_a_light_ceiling_adds_mass(oracle: Callable[..., None
     ratio = frequencies_of(large(fixed), 300.0) / frequencies_of(large(heavier), 300.0)
     # The mass changes frequencies by 1.2 %, the stiffness of the board by 2e-5.
     oracle("natural frequencies: fixed subceiling − added mass", "other model", ratio - 1, 1e-4)
-    oracle(
-        "energy radiated by a fixed subceiling − added mass",
-        "other model",
-        radiated_by(fixed) - radiated_by(heavier),
-        0.5,
-        "dB",
-    )
+    change = radiated_by(fixed) - radiated_by(heavier)
+    oracle("energy radiated by a fixed subceiling − added mass", "other model", change, 0.5, "dB")
 
 
 def test_soft_fastening_above_a_deep_cavity_leaves_the_floor_alone() -> None:
@@ -96,12 +91,8 @@ def test_frequencies_are_those_of_masses_on_a_spring_for_each_shape(
     # The second mode of the first shape lies at the resonance of both masses on the air.
     resonance = np.sqrt(air * (1 / upper + 1 / BOARD)) / (2 * np.pi)
     assert abs(found / resonance - 1).min() < 2e-3
-    oracle(
-        "natural frequencies of two plates on air",
-        "closed form",
-        found / expected[: len(found)] - 1,
-        1e-9,
-    )
+    error = found / expected[: len(found)] - 1
+    oracle("natural frequencies of two plates on air", "closed form", error, 1e-9)
 
 
 def test_radiated_level_has_the_resonance_of_a_mass_on_a_spring(
@@ -121,13 +112,8 @@ def test_radiated_level_has_the_resonance_of_a_mass_on_a_spring(
     follows = (1 + 0.3j) / (1 + 0.3j - (frequency / resonance) ** 2)
     expected = 10 * np.log10((abs(follows) ** 2).mean(axis=1))
     assert expected[0] > 9
-    oracle(
-        "level below a subceiling − that below the slab, by one mass on a spring",
-        "closed form",
-        found - expected,
-        1.5,
-        "dB",
-    )
+    what = "level below a subceiling − that below the slab, by one mass on a spring"
+    oracle(what, "closed form", found - expected, 1.5, "dB")
 
 
 @pytest.mark.parametrize("floor", [HUNG, JOISTS, thud.LaminateFloor(subceiling_thickness=0.0125)])
@@ -167,8 +153,7 @@ def test_subceiling_lies_below_a_floating_plate() -> None:
 
 def test_air_of_the_room_is_the_spring_of_a_subceiling() -> None:
     """The air above a subceiling was that of the default room, whatever the room stated."""
-    dense = thud.Room(air_density=2.0, sound_speed=343.0)
-    light = thud.Room(air_density=1.0, sound_speed=343.0)
+    dense, light = (thud.Room(air_density=density) for density in (2.0, 1.0))
     floor = replace(HUNG, channel_stiffness=0.0)
     shallow = replace(floor, cavity_depth=0.1)
     assert frequencies_of(floor, 150.0, dense) == pytest.approx(
