@@ -16,7 +16,7 @@ from edges import get_fault
 
 import thud
 
-FEW = {"namelists": 40, "recordings": 80, "lumped": 12}
+FEW = {"namelists": 40, "recordings": 80, "lumped": 40, "studies": 30}
 
 
 @pytest.mark.parametrize(
