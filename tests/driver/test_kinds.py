@@ -23,14 +23,14 @@ def test_every_kind_follows_from_its_line(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "size"), [("design", 0), ("sensitivity", 16), ("uncertainty", 30)]
+    ("name", "size"), [("design", 0), ("sensitivity", 16), ("sweep", 0), ("uncertainty", 30)]
 )
 def test_command_writes_files(
     name: str, size: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     design = f"design.size = {size}\n" if size else ""
     more = ["study_indices.csv"] if name == "sensitivity" else []
-    values = "values=[2, 3]" if name == "design" else "low=2, high=3"
+    values = "low=2, high=3" if size else "values=[2, 3]"
     text = f"parameters = {{mass={{{values}}}, height={{{values}}}}}"
     (tmp_path / "study.toml").write_text(design + text)
     assert cli.main([name, str(tmp_path / "study.toml"), "-o", str(tmp_path / "out")]) == 0
