@@ -15,6 +15,7 @@ from scipy.stats import loguniform, norm, uniform
 import thud
 from thud.base.units import SIZES
 from thud.case.keys import known_keys
+from thud.level.assessment import wilson_interval
 from thud.studies import sampling
 from thud.studies.design import Design
 from thud.studies.parameter import MAX_VALUES
@@ -174,15 +175,7 @@ def test_range_of_a_surrogate_counts_undecided_samples_twice() -> None:
     assert found.probability == 3 / 8
     assert (found.conforming, found.computed) == (3, 8)
     assert found.standard_error == pytest.approx(math.sqrt(3 / 8 * 5 / 8 / 8))
-
-
-@pytest.mark.parametrize(("hits", "trials"), [(0, 10), (10, 10), (3, 7), (368, 500)])
-def test_interval_is_wilson_s(hits: int, trials: int) -> None:
-    found = uncertainty(np.zeros((trials, 5)), [i < hits for i in range(trials)]).interval
-    share, z = hits / trials, norm.ppf(0.975)
-    # At its ends the share is z standard errors off: a quadratic equation.
-    coefficients = (1 + z**2 / trials, -2 * share - z**2 / trials, share**2)
-    assert found == pytest.approx(sorted(np.roots(coefficients).real), abs=1e-12)
+    assert found.interval == wilson_interval(3, 8)
 
 
 def test_table_of_the_uncertainty_has_the_shares_within_the_limits() -> None:

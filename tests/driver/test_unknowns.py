@@ -7,8 +7,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import pytest
-from conftest import naming
 from scipy.stats import truncnorm
 
 import thud
@@ -30,15 +28,6 @@ def test_unknowns_survive_files(tmp_path: Path, executable: str) -> None:
     subprocess.run([executable, "case.nml"], cwd=tmp_path, check=True, capture_output=True)
     (echo,) = tmp_path.glob("outputs/*/effective.nml")
     assert thud.read_case(echo).unknowns == case.unknowns
-
-
-def test_unknown_without_an_effect_is_refused() -> None:
-    unknowns = thud.Unknowns(key="fractional_order", low=0.2, high=0.9, reason="not measured")
-    assert unknowns.key == ("fractional_order",)
-    case = thud.Case(unknowns=unknowns)
-    with pytest.raises(thud.InputError, match=naming("&unknowns", "fractional_order", "same drop")):
-        thud.assess(case)
-    assert thud.assess(replace(case, model=thud.ModalBall(damping_law="fractional"))).counts[1]
 
 
 def test_normal_distribution_is_truncated_and_a_wide_one_uniform() -> None:
