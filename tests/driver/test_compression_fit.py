@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from compression_disturbances import CASE, MODEL, TOUCH, TRUE, curve_of, miss, quiet
 from conftest import codes, noted, quiet_fit
 
 import thud
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "validation"))
-from compression_disturbances import CASE, MODEL, TOUCH, TRUE, curve_of, miss, quiet
 
 E = ["youngs_modulus"]
 Measured = tuple[np.ndarray, np.ndarray]

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from conftest import codes, noted, quiet_fit
+from fit_disturbances import DISTURBANCES, QUIET, RATE, TRUTH, pulse
 from scipy import stats
 from scipy.linalg import toeplitz
 
@@ -30,9 +29,6 @@ from thud.studies.fitting.record import (
     on_grid,
     record_noise,
 )
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "validation"))
-from fit_disturbances import DISTURBANCES, QUIET, RATE, TRUTH, pulse
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 from conftest import SHELL, codes, naming, noted, quiet_fit
+from fit_assumptions import ASSUMED, BACKGROUND, RATE, START, TRUTH, record
 
 import thud
 from thud.case.keys import with_values
@@ -17,9 +16,6 @@ from thud.studies.fitting import force_target
 from thud.studies.fitting.comparison import misfit_ratio
 from thud.studies.fitting.estimate import posterior
 from thud.studies.fitting.search import ORDERS, UNKNOWNS, alternatives
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "validation"))
-from fit_assumptions import ASSUMED, BACKGROUND, RATE, START, TRUTH, record
 
 
 def miss(fit: thud.Fit) -> float:
