@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 CASE = thud.Case(floor=thud.Plate(), room=thud.Room(), levels=thud.Levels(bands="both"))
-TEXT = "&model /\n&floor name = 'plate' /\n&room /\n"
 # With few modes.
 DEAD = thud.Room(reverberation_time=0.05)
 THICKNESSES = [0.1, 0.2]
@@ -96,7 +95,8 @@ def test_table_of_floors_has_the_same_numbers(
     run: Run, case_file: CaseFile, tmp_path: Path
 ) -> None:
     (tmp_path / "samples.txt").write_text("thickness; plate.loss_factor\n0.1; 0.01\n-1; 0.01\n")
-    done = run(case_file(TEXT), "--samples", "samples.txt", "-o", "out")
+    case = case_file("&model /\n&floor name = 'plate' /\n&room /\n")
+    done = run(case, "--samples", "samples.txt", "-o", "out")
     assert done.returncode in {0, 2}, done.stderr
     with (tmp_path / "out" / "samples.csv").open(encoding="utf-8") as file:
         first, second = csv.DictReader(file)
@@ -113,11 +113,8 @@ def test_table_of_floors_has_the_same_numbers(
 
 
 def test_studies_vary_floors_and_rooms(tmp_path: Path, many: thud.Ensemble) -> None:
-    path = tmp_path / "case.nml"
-    path.write_text(TEXT, encoding="utf-8")
     axes = {"thickness": {"values": THICKNESSES}, "volume": {"values": [40.0, 60.0]}}
-    study = {"case": str(path), "parameters": axes}
-    found = thud.design(study)
+    found = thud.design({"case": CASE.to_namelist(), "parameters": axes})
     rating = found.dataset["room_rating"]
     assert rating.shape == (2, 2)
     # A larger room is quieter.
@@ -127,8 +124,8 @@ def test_studies_vary_floors_and_rooms(tmp_path: Path, many: thud.Ensemble) -> N
     assert found.dataset["room_third"].dims[-1] == "rated_third"
     draws = {"kind": "random", "size": 4}
     parameters = {"reverberation_time(1)": {"low": 0.4, "high": 0.6}}
-    spread = thud.uncertainty({"case": str(path), "parameters": parameters, "design": draws})
-    assert any(row[0] == "rating of the room" for row in spread.rows())
+    study = {"case": CASE.to_namelist(), "parameters": parameters, "design": draws}
+    assert any(row[0] == "rating of the room" for row in thud.uncertainty(study).rows())
     dataset = many.to_xarray()
     assert dataset["room_third"].shape == (4, 12)
     assert dataset["contact_third"].shape == (4, 15)

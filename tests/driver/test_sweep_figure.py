@@ -11,8 +11,6 @@ import thud
 from thud.plot.style import RATING_SYMBOL
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from matplotlib.figure import Figure
 
 HEIGHTS = {"values": [50, 100], "unit": "cm"}
@@ -106,14 +104,12 @@ def test_figure_says_what_lines_and_shades_are() -> None:
     assert "shades" not in explained
 
 
-def test_case_with_a_room_is_drawn(tmp_path: Path) -> None:
-    case = tmp_path / "case.nml"
-    case.write_text("&model name='hollow_sphere' /\n&floor name = 'plate' /\n&plate /\n&room /\n")
-    thickness = {"values": [0.14, 0.18, 0.22], "unit": "m"}
-    figure = draw(case=str(case), parameters={"plate.thickness": thickness})
+def test_case_with_a_room_is_drawn() -> None:
+    case = thud.Case(model=thud.HollowSphere(), floor=thud.Plate(), room=thud.Room())
+    result = thud.sweep({"plate.thickness": [0.14, 0.18, 0.22]}, case=case)
+    figure = result.plot()
     (axes,) = figure.axes
     assert axes.get_xlabel() == "Plate thickness, m"
-    result = thud.sweep({"case": str(case), "parameters": {"plate.thickness": thickness}})
     (line,) = axes.lines
     assert line.get_ydata() == pytest.approx(result.dataset["room_rating"].values)
     assert figure.get_supylabel().startswith(RATING_SYMBOL)
