@@ -84,22 +84,6 @@ def test_functions_take_numbers_of_numpy_and_refuse_wrong_types(tmp_path: Path) 
                     refused(function, **{**words, name: wrong})
 
 
-@pytest.mark.parametrize(
-    "function",
-    [
-        thud.read_recording, thud.read_case, thud.read_room_levels, thud.compare,
-        thud.assess_levels, lambda wrong: thud.read_recording([], config=wrong or np.ones(2)),
-        lambda wrong: thud.write_case(wrong, "case.nml"),
-    ],
-)  # fmt: skip
-@pytest.mark.parametrize("wrong", [None, 5, object()])
-def test_functions_refuse_what_is_nothing_to_read(
-    function: Callable[[object], object], wrong: object
-) -> None:
-    with pytest.raises((TypeError, thud.InputError)):
-        function(wrong)
-
-
 @pytest.mark.parametrize("kind", GROUPS, ids=lambda kind: kind.__name__)
 def test_groups_take_numbers_of_numpy_and_refuse_wrong_types(kind: type[Group]) -> None:
     default = kind()
