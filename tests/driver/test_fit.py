@@ -132,14 +132,12 @@ def test_other_sampling_rates_are_no_hindrance() -> None:
     assert fit.values["youngs_modulus"] == pytest.approx(1.8e6, rel=10 * slope / 8 / RATE**2 / 21)
 
 
-@pytest.mark.parametrize(
-    ("noise", "count"), [(5.0, 100), (None, 100)], ids=["given noise", "noise from the residuals"]
-)
+@pytest.mark.parametrize("noise", [5.0, None], ids=["given noise", "noise from the residuals"])
 @pytest.mark.slow
-def test_intervals_cover_the_truth_as_often_as_they_say(noise: float | None, count: int) -> None:
+def test_intervals_cover_the_truth_as_often_as_they_say(noise: float | None) -> None:
     # 90 % of the intervals are to hold the truth: the number of those that do is binomial, and
     # leaves these quantiles once in 10 000 times.
-    confidence = 0.9
+    count, confidence = 100, 0.9
     truth = {"youngs_modulus": 1.8e6, "height": 1.1, "time_shift": 220 / RATE - 0.1}
     case = thud.Case(sampling=thud.Sampling(duration=0.026), model=thud.HollowSphere())
     impact = thud.solve(replace(case, ball=TRUTH.ball, drop=thud.Drop(1.1)))
@@ -161,15 +159,6 @@ def test_intervals_cover_the_truth_as_often_as_they_say(noise: float | None, cou
     ends = stats.chi2.ppf([0.5e-4, 1 - 0.5e-4], count)
     assert (ends[0] < spread).all(), spread
     assert (spread < ends[1]).all(), spread
-
-
-def test_covariance_of_a_linear_problem_has_what_is_not_lost() -> None:
-    jacobian = np.random.default_rng(1).normal(size=(20, 3)) * [1.0, 10.0, 0.1]
-    known = infer(jacobian, jacobian, 1.0)
-    np.testing.assert_allclose(known.covariance, np.linalg.inv(jacobian.T @ jacobian), rtol=1e-10)
-    known = infer(np.zeros((5, 2)), np.zeros((5, 2)), 1.0)
-    assert len(known.null) == 2
-    assert np.isinf(np.diag(known.covariance)).all()
 
 
 def test_worst_directions_are_axes_of_the_ellipsoid() -> None:

@@ -10,21 +10,18 @@ import pytest
 from conftest import codes, noted, quiet_fit
 from fit_disturbances import DISTURBANCES, QUIET, RATE, TRUTH, pulse
 from scipy import stats
-from scipy.linalg import toeplitz
 
 import thud
 from thud.base.note import Note
 from thud.recordings.background import Background, fit_noise, unit_covariances
 from thud.studies.fitting import comparison
 from thud.studies.fitting.record import (
-    Noise,
     Quiet,
     cell_waves,
     find_pulse,
     find_quiet,
     find_tones,
     fit_quiet,
-    grid_covariance,
     log_likelihood,
     on_grid,
     record_noise,
@@ -53,17 +50,6 @@ def pulls(fit: thud.Fit) -> NDArray[np.float64]:
 def to_grid(samples: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     """Return columns of samples on a grid of `count` points."""
     return on_grid(np.fft.rfft(samples, norm="ortho", axis=0)[: count // 2 + 1])
-
-
-@pytest.mark.parametrize("kind", [0, 1, 2])
-def test_covariance_on_the_grid_is_that_of_samples(kind: int) -> None:
-    # The closed form of the double sum over samples against that sum.
-    time = np.arange(300) / RATE
-    samples = time, time + 1 / RATE
-    row = unit_covariances((time[:1], time[:1] + 1 / RATE), samples)[kind, 0]
-    dense = to_grid(to_grid(toeplitz(row), 41).T, 41)
-    found = grid_covariance(row, 41)
-    np.testing.assert_allclose(found, dense, atol=1e-12 * np.abs(dense).max())
 
 
 @pytest.mark.parametrize("given", [None, 2.0])
@@ -97,18 +83,6 @@ def test_noise_of_a_record_is_that_of_its_samples(given: float | None) -> None:
     about = np.eye(count) - 1 / count
     deviation = np.sqrt(np.trace(about @ grid(noise)) / (count - 1))
     assert found.deviation == pytest.approx(deviation, rel=1e-3)
-
-
-def test_background_is_the_expected_value_of_what_is_predicted() -> None:
-    rng = np.random.default_rng(4)
-    root, other = rng.normal(size=(12, 12)), rng.normal(size=(12, 3))
-    predicted, rest = other @ other.T, root @ root.T
-    difference = rng.normal(size=12)
-    whiten = np.linalg.inv(np.linalg.cholesky(rest + predicted))
-    np.testing.assert_allclose(
-        Noise(whiten, predicted, 1.0).background(difference),
-        predicted @ np.linalg.solve(rest + predicted, difference),
-    )
 
 
 def background_of(seed: int, *waves: float, size: float = 0.0) -> Quiet:

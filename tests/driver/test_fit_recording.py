@@ -112,13 +112,6 @@ def test_slow_noise_of_fast_records_has_weights(shell: thud.Impact) -> None:
     assert abs(modulus - 1.6e6) < 5 * error
 
 
-def test_too_little_quiet_leaves_the_noise_to_the_residuals(shell: thud.Impact) -> None:
-    force, rate = pulse(shell), shell.sample_rate
-    force, _ = make_recording(force, rate, before=0.006, after=0.006, noise_db=NOISE_DB)
-    record = thud.read_recording(Signal.from_array(force, rate))
-    assert not ForceTarget(record).compare().known_noise
-
-
 @pytest.fixture(scope="module")
 def two(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Write two drops of balls of different moduli, as a recording and as a table."""

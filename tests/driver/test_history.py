@@ -221,14 +221,6 @@ def test_few_points_on_a_line_by_chance_are_no_trend(stated: float) -> None:
     assert stats.binom.ppf(0.001, runs, 0.05) <= told <= stats.binom.ppf(0.999, runs, 0.05)
 
 
-def test_scatter_beyond_the_stated_uncertainty_counts() -> None:
-    time, value = np.arange(6.0), np.array([31.0, 31.5, 30.6, 31.6, 31.0, 31.8])
-    trusting, doubting = (line(time, value, deviation) for deviation in (0.01, 0.4))
-    assert not trusting.significant
-    assert trusting.slope == pytest.approx(doubting.slope)
-    assert trusting.expanded > 0.2
-
-
 def test_chart_shows_each_criterion_its_limits_and_verdicts(folder: Path) -> None:
     found = read_history([folder])
     figure = draw_history(found)

@@ -69,14 +69,6 @@ def test_probability_of_a_criterion_that_is_known() -> None:
     assert low < 0.5 < high
 
 
-def test_samples_without_results_are_counted_apart() -> None:
-    study = {**SMALL, "design": {"size": 50}, "parameters": {"height": {"low": -1, "high": 1}}}
-    del study["temperature"]
-    result = thud.uncertainty(study)
-    assert 50 - result.computed == np.sum(result.dataset["height"].values <= 0) > 0
-    assert result.levels.shape == (result.computed, 5)
-
-
 def test_figure_shows_distribution_over_tolerance(small: Uncertainty, shell: thud.Impact) -> None:
     figure = small.plot()
     (axes,) = figure.axes
