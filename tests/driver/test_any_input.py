@@ -151,14 +151,9 @@ def test_keys_of_any_namelist_are_taken_or_refused(data: st.DataObject, executab
             assert thud.read_case("again.nml") == thud.read_case("case.nml")
             return
         # What another key or group does not allow is named together with it.
-        names = (
-            [naming("case.nml", f"&{wrong.group}", wrong.name)]
-            if wrong
-            else [
-                naming("case.nml", name) for key in stated for name in (key.name, f"&{key.group}")
-            ]
-        )
-        assert any(re.search(name, said) for name in names), (said, texts)
+        each = [(name,) for key in stated for name in (key.name, f"&{key.group}")]
+        facts = [(f"&{wrong.group}", wrong.name)] if wrong else each
+        assert any(re.search(naming("case.nml", *names), said) for names in facts), (said, texts)
         assert "\n" not in said
         done = subprocess.run(
             [executable, "case.nml"], capture_output=True, text=True, check=False, timeout=60

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -50,9 +50,7 @@ def test_labels_break_where_they_do_not_fit() -> None:
     assert _label("youngs_modulus", "MPa", MAX_CHARACTERS / 2) == "Young's modulus, MPa"
     assert _label("youngs_modulus", "MPa", MAX_CHARACTERS / 3) == "Young's modulus,\nMPa"
     figure = confidence(fit_with_noise(5.0, "youngs_modulus", "height"))
-    shown = {axes.get_xlabel() for axes in figure.axes} | {
-        axes.get_ylabel() for axes in figure.axes
-    }
+    shown = {label for axes in figure.axes for label in (axes.get_xlabel(), axes.get_ylabel())}
     assert shown == {"", "Young's modulus, MPa", "Height, mm", "Time shift, ms"}
 
 
@@ -63,25 +61,17 @@ def test_level_target_has_no_ellipse_of_one_parameter() -> None:
     assert list(figures) == ["fit"]
     assert labels(figures["fit"]) == ["Standard deviation of the target", "Target", "Fit"]
     assert figures["fit"].axes[1].get_xlabel() == "Octave band, Hz"
-    spans = [
-        (one.get_paths()[0].vertices[:, 1].min(), one.get_paths()[0].vertices[:, 1].max())
-        for one in figures["fit"].axes[0].collections[:5]
-    ]
+    drawn = (one.get_paths()[0].vertices[:, 1] for one in figures["fit"].axes[0].collections[:5])
+    spans = [(heights.min(), heights.max()) for heights in drawn]
     assert np.allclose(spans, [(level - 0.5, level + 0.5) for level in levels])
 
 
 @pytest.mark.parametrize("freedom", [None, 7, 40])
 def test_ellipse_is_the_joint_confidence_region(freedom: int | None) -> None:
     fit = fit_with_noise(5.0, "youngs_modulus", "height")
-    pair = dataclasses.replace(
-        fit,
-        names=fit.names[:2],
-        units=fit.units[:2],
-        estimate=fit.estimate[:2],
-        covariance=fit.covariance[:2, :2],
-        limits=fit.limits[:2],
-        interval_freedom=freedom,
-    )
+    first = {name: getattr(fit, name)[:2] for name in ("names", "units", "estimate", "limits")}
+    covariance = fit.covariance[:2, :2]
+    pair = replace(fit, **first, covariance=covariance, interval_freedom=freedom)
     (axes,) = draw_fit(pair)["confidence"].axes
     units = [size for _, size in pair.display_units.values()]
     points = axes.patches[0].get_xy() * units - pair.estimate

@@ -35,11 +35,7 @@ def write_table(path: Path, titles: str, *columns: np.ndarray) -> Path:
 
 
 def write_universal(
-    path: Path,
-    response: int,
-    values: np.ndarray,
-    system: dict[str, Any] | None = None,
-    **words: object,
+    path: Path, response: int, values: np.ndarray, *systems: dict[str, Any], **words: object
 ) -> Path:
     pyuff = pytest.importorskip("pyuff")
     one: dict[str, Any] = {
@@ -49,7 +45,7 @@ def write_universal(
         "ordinate_spec_data_type": response, "orddenom_spec_data_type": 13,
         "z_axis_spec_data_type": 0, "x": FREQUENCY, "data": values, **words,
     }  # fmt: skip
-    pyuff.UFF(str(path)).write_sets([system, one] if system else [one], "overwrite")
+    pyuff.UFF(str(path)).write_sets([*systems, one], "overwrite")
     return path
 
 
@@ -60,11 +56,8 @@ def exact() -> thud.MobilityFit:
 
 def test_modes_and_their_number_are_found(exact: thud.MobilityFit) -> None:
     order = np.argsort(exact.floor.pole_frequency)
-    np.testing.assert_allclose(
-        np.column_stack([exact.floor.pole_frequency, exact.floor.damping_ratio])[order],
-        [(f, z) for f, _, z in MODES],
-        rtol=1e-8,
-    )
+    poles = np.column_stack([exact.floor.pole_frequency, exact.floor.damping_ratio])[order]
+    np.testing.assert_allclose(poles, [(f, z) for f, _, z in MODES], rtol=1e-8)
     assert exact.floor.direct == pytest.approx(2e-6, rel=1e-6)
     assert exact.error < 1e-10
     assert not exact.notes
@@ -113,10 +106,8 @@ def test_units_of_universal_files_are_applied_or_refused(
     response: int, above: str, system: int | None, tmp_path: Path
 ) -> None:
     per_metre, per_newton = SYSTEMS[system]
-    units = {
-        "type": 164, "units_code": system, "length": per_metre, "force": per_newton, "temp": 1.0,
-        "temp_offset": 0.0,
-    }  # fmt: skip
+    units = {"type": 164, "units_code": system, "length": per_metre, "force": per_newton}
+    systems = [units | {"temp": 1.0, "temp_offset": 0.0}] if system else []
     power = {8: -1, 11: 0, 12: 1}[response]
     for below, force in FORCES.items():
         length = RESPONSES[response][above]
@@ -127,13 +118,8 @@ def test_units_of_universal_files_are_applied_or_refused(
             (above in {"NONE", "g"} or (length or 0) * per_metre == pytest.approx(1, rel=1e-3))
             and (below == "NONE" or (force or 0) * per_newton == pytest.approx(1, rel=1e-3))
         )
-        path = write_universal(
-            tmp_path / "point.uff",
-            response,
-            MOBILITY * S**power / scale,
-            system and units,
-            **labels,
-        )
+        values = MOBILITY * S**power / scale
+        path = write_universal(tmp_path / "point.uff", response, values, *systems, **labels)
         refused = pytest.raises(thud.InputError, match=naming(path, "unit"))
         with refused if length is None or force is None or not agree else nullcontext():
             assert thud.read_mobility(path).values == pytest.approx(MOBILITY, rel=1e-4)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from copy import copy
@@ -199,11 +200,8 @@ def test_peaks_that_differ_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_drops_are_those_of_the_study(trained: thud.Surrogate) -> None:
-    width = np.ptp(trained.region, axis=1)
-    columns = dict(
-        zip(trained.keys, (trained.region[:, 0] + trained.points * width).T, strict=True)
-    )
-    drops = thud.solve_many(columns, trained.case)
+    values = trained.region[:, 0] + trained.points * np.ptp(trained.region, axis=1)
+    drops = thud.solve_many(dict(zip(trained.keys, values.T, strict=True)), trained.case)
     np.testing.assert_allclose(trained.drops[:, -5:], drops.floor_octave, atol=1e-9)
     strata = np.sort((trained.points * 64).astype(int), axis=0)
     np.testing.assert_array_equal(strata, np.arange(64)[:, None].repeat(3, axis=1))
@@ -326,52 +324,36 @@ def test_figure_shows_held_out_errors(trained: thud.Surrogate) -> None:
 
 def test_verdict_is_undecided_where_errors_reach_a_limit() -> None:
     criteria = thud.assess_levels(np.zeros(5), 0, 0, 0, 0, 0).criteria
-    middle = np.array([(one.lower + one.upper) / 2 for one in criteria])
-    half = np.array([(one.upper - one.lower) / 2 for one in criteria])
-
-    def verdict(value: np.ndarray, error: np.ndarray) -> tuple[float, bool, bool]:
-        found = assess_many(value[None], error[None], "rubber_ball")
-        return tuple(found[name][0] for name in ("margin", "conforms", "undecided"))  # type: ignore[return-value]
-
-    none = np.zeros(10)
-    margin, conforms, undecided = verdict(middle, none)
-    assert margin == pytest.approx(half[:5].min())
-    assert (conforms, undecided) == (True, False)
-    for i in (0, 4, 5, 6, 9):
-        one = np.eye(10)[i]
-        for side in (-1, 1):
-            inside, outside = (middle + side * r * half * one for r in (0.9, 1.1))
-            # An error of less than a tenth of the half width, and one of more.
-            for r, is_undecided in ((0.09, False), (0.11, True)):
-                error = r * half * one
-                assert verdict(inside, error)[1:] == (True, is_undecided)
-                assert verdict(outside, error)[1:] == (False, is_undecided)
+    lower, upper = np.array([(one.lower, one.upper) for one in criteria]).T
+    # The number of peaks is allowed one value.
+    middle, half, each = (lower + upper) / 2, (upper - lower) / 2, np.eye(10)[[0, 4, 5, 6, 9]]
+    found = assess_many(middle[None], np.zeros((1, 10)), "rubber_ball")
+    assert found["margin"] == pytest.approx(half[:5].min())
+    # Inside or outside by a tenth of the half width, and an error of less than that, or of more.
+    for distance, side, error in itertools.product((0.9, 1.1), (-1, 1), (0.09, 0.11)):
+        values = middle + side * distance * half * each
+        found = assess_many(values, error * half * each, "rubber_ball")
+        assert found["conforms"].tolist() == [distance < 1] * 5
+        assert found["undecided"].tolist() == [error > 0.1] * 5
     # A sample that surely fails another criterion is decided.
-    failed = middle + 2 * half * np.eye(10)[6] + 0.9 * half * np.eye(10)[0]
-    assert verdict(failed, 0.2 * half * np.eye(10)[0])[1:] == (False, False)
+    failed = middle + half * (2 * each[3] + 0.9 * each[0])
+    found = assess_many(failed[None], 0.2 * half * each[:1], "rubber_ball")
+    assert (found["conforms"], found["undecided"]) == (False, False)
 
 
-def answering() -> thud.Surrogate:
-    """Return a surrogate whose weights are 0: it predicts the mean of its drops."""
+def test_answers_are_the_verdict_of_what_is_predicted() -> None:
+    """With weights of 0 a surrogate predicts the mean of its drops."""
     names = {"floor_octave": 5, "elastic_octave": 5, "contact_time": 1, "restitution": 1}
-    mean = np.array(
-        [39.0, 31, 23, 17, 12.5, 1, 2, 3, 4, 5, 20 * np.log10(0.02), 20 * np.log10(0.8)]
-    )
-    result: thud.Surrogate = object.__new__(thud.Surrogate)
-    return altered(
-        result, case=thud.Case(model=thud.HollowSphere()), keys=("height", "mass"),
+    mean = [39.0, 31, 23, 17, 12.5, 1, 2, 3, 4, 5, 20 * np.log10(0.02), 20 * np.log10(0.8)]
+    case = thud.Case(model=thud.HollowSphere(), levels=thud.Levels(force="floor"))
+    surrogate = altered(
+        object.__new__(thud.Surrogate), case=case, keys=("height", "mass"),
         region=np.array([[0.9, 1.1], [2.0, 3.0]]), outputs=names, peaks=1,
         dataset=xr.Dataset(attrs={"thud_version": thud.__version__}),
         points=np.random.default_rng(1).random((64, 2)), drops=np.tile(mean, (64, 1)),
         length=np.ones(2), weights=np.zeros((64, 12)),
         residuals=np.random.default_rng(2).normal(0, 0.02, (64, 12)),
     )  # fmt: skip
-
-
-def test_answers_are_the_verdict_of_what_is_predicted() -> None:
-    surrogate = answering()
-    case = replace(surrogate.case, levels=thud.Levels(force="floor"))
-    surrogate = altered(surrogate, case=case)
     height = np.array([1.0, 0.985, 1.2, 0.9, 1.1, 0.9 - 1e-12, 1.1 + 1e-12, 0.9 - 1e-8])
     found = surrogate.predict(case, {"height": height, "mass": 2.5})
     assert found["status"].tolist() == [0, 0, 1, 0, 0, 0, 0, 1]
