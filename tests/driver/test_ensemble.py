@@ -47,8 +47,9 @@ def random_sets(count: int, seed: int) -> dict[str, np.ndarray]:
 def assert_same_bits(one: thud.Ensemble, other: thud.Ensemble, *orders: np.ndarray) -> None:
     """Compare all results but the forces; the orders are those of one and of the other."""
     first, second = (*orders, slice(None), slice(None))[:2]
-    for name, values in other.results.items():
-        np.testing.assert_array_equal(one.results[name][first], values[second], name)
+    found = other.results
+    for name, expected in one.results.items():
+        np.testing.assert_array_equal(expected[first], found[name][second], name)
 
 
 def test_equals_the_single_solver() -> None:
