@@ -1,4 +1,4 @@
-"""Tables: random layouts around known numbers are read right or refused, with their units."""
+"""Tables: any layout of known numbers is read right or refused, with units; rounded times."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from recording_files import opened
 import thud
 from thud.base.units import UNITS, find_unit
 from thud.recordings.formats.text import read_channels, read_table
-from thud.studies.fitting.record import time_and_force
+from thud.studies.fitting.record import read_record, time_and_force
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -242,6 +242,10 @@ LAYOUTS = [
     ("N", "fs: 8000\nF [N];", "{A};"),
     ("N", "fs: 8000\nF [N],G", "{a},0"),
     ("N", "fs: 8.000 Hz", "{A};"),
+    # Quotes, and blanks around cells and comments.
+    ("N", "Time [s],Force [N]", '  "{T}" , "{A}",'),
+    ("kN", "# plate\n\ntime_s;force_kN", " {t} ;  {a} # x"),
+    ("kN", "t_ms\tF_kN", "  {m} \t  {a}  #x"),
 ]  # fmt: skip
 
 
@@ -344,3 +348,82 @@ def test_units_in_brackets_are_no_titles(head: str, tmp_path: Path) -> None:
 )  # fmt: skip
 def test_spellings_of_units(text: str, unit: str) -> None:
     assert find_unit(text) == unit
+
+
+def rows_read(text: str, folder: Path) -> np.ndarray:
+    (folder / "plate.csv").write_text(text)
+    return np.column_stack([c.values for c in read_table(folder / "plate.csv").columns])
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("0.100020;1,575", (0.10002, 1575)),
+        ('"0.100020","1,575"', (0.10002, 1575)),
+        ("0,100020;1,575", (0.10002, 1.575)),
+        ('"0,100020","1.575"', (0.10002, 1575)),
+        ("0.100020,1.575", (0.10002, 1.575)),
+        ("12,345.5;-1,234,567.25", (12345.5, -1234567.25)),
+        ("12.345,5;-1.234.567,25", (12345.5, -1234567.25)),
+        ("12 345,5;-1 234 567,25", (12345.5, -1234567.25)),
+        ("12\u202f345,5;-1\u00a0234\u00a0567,25", (12345.5, -1234567.25)),
+        ("12'345.5\t-1\u2019234\u2019567.25", (12345.5, -1234567.25)),
+        ("1,575;2,5", (1.575, 2.5)),
+        ("1,575;2.5", (1575, 2.5)),
+        ("1,575;2,1234", (1.575, 2.1234)),
+        ("1,575;1234,125", (1.575, 1234.125)),
+        ("1,575;0,125", (1.575, 0.125)),
+        ("1,575;1,234,567", (1575, 1234567)),
+        ("1,575;2,125e3", (1.575, 2125)),
+    ],
+)
+def test_decimal_mark_is_that_of_the_whole_table(
+    line: str, expected: tuple[float, ...], tmp_path: Path
+) -> None:
+    # Lines that decide nothing stand above the one that does.
+    separator = next(mark for mark in "\t; ," if mark in line.replace("2 ", "").replace("4 ", ""))
+    integers = [(3 * i % 5, 7 * i % 4) for i in range(8)]
+    above = "".join(f"{i}{separator}{k}\n" for i, k in [("x", "y"), *integers])
+    np.testing.assert_array_equal(rows_read(above + line + "\n", tmp_path), [*integers, expected])
+
+
+@pytest.mark.parametrize("empty", ["\n" * 8, " \n" * 8])
+def test_empty_lines_behind_a_table_are_left_out(
+    empty: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("thud.recordings.formats.text.BLOCK", 8)
+    found = rows_read("7, 0.250\n" * 8 + empty, tmp_path)
+    np.testing.assert_array_equal(found, [(7, 0.25)] * 8)
+
+
+# Rate of recorders of sound, Hz.
+CD = 44100.0
+
+
+@pytest.mark.parametrize(
+    ("form", "begin"),
+    [
+        *((form, 0.2) for form in (".5f", ".6f", ".7f", ".9f", ".6e", ".18e", "")),
+        *((form, 123.0) for form in (".5f", ".6f", ".9f", ".18e", "")),
+    ],
+)
+def test_rounded_times_are_even(form: str, begin: float) -> None:
+    time = begin + np.arange(500) / CD
+    written = np.array([float(format(value, form)) for value in time])
+    record = read_record(np.column_stack([written, np.sin(np.linspace(0, np.pi, 500))]))
+    # The slope of a line through n points of standard deviation s has that of s sqrt(12 / n^3).
+    digit = float(np.abs(written - time).max())
+    assert record.sample_rate == pytest.approx(
+        CD, rel=4 * digit / np.sqrt(3) * CD * np.sqrt(12 / 500**3) + 1e-9
+    )
+    # The begin of the line has 2/sqrt(n) of that of a time.
+    deviation = 2 * digit / np.sqrt(3 * 500)
+    assert record.time[0] == pytest.approx(begin, abs=4 * deviation + 1e-12)
+
+
+@pytest.mark.parametrize("digits", [5, 6, 7, 9, 16])
+def test_rounded_times_do_not_move_the_band(digits: int) -> None:
+    # 1.25 kHz are the 75th harmonic of 60 ms, and belong to the band.
+    force = np.append(thud.solve(duration=0.03).floor_force, np.zeros(1323))
+    time = (np.arange(2646) / CD).round(digits)
+    assert thud.ForceTarget((time, force)).compare().size == 2 * 75 + 1
