@@ -7,26 +7,25 @@ import json
 import tomllib
 from dataclasses import replace
 from datetime import date
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 import soundfile
 from conftest import REPOSITORY, codes, names_in, noted, recorded
-from synthetic import half_sine, make_recording
+from recording_files import noisy
+from synthetic import half_sine, make_recording, recording_of
 
 import thud
 from thud import cli
-from thud.recordings.config import Config, read_config
+from thud.recordings.config import Config, Instrument, read_config
 from thud.recordings.instruments import AMPLITUDE_DECIBEL, Plate
 from thud.recordings.signal import Signal
 from thud.report.contents import report_criteria
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from thud.level.assessment import Criterion
-
 
 FOLDER = REPOSITORY / "inputs/recordings"
 LAB = read_config(FOLDER / "lab.toml")
@@ -35,10 +34,10 @@ DROPS = [drop for drop in TRUTH["drop"] if drop["file"].startswith("drop_")]
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("working_directory")
 def test_examples_are_measured_as_they_were_made(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.chdir(tmp_path)
     files = [str(FOLDER / drop["file"]) for drop in DROPS]
     config = str(FOLDER / "lab.toml")
     monkeypatch.setattr("thud.cli.recording_commands.MAX_PRINTED", 2)
@@ -50,8 +49,9 @@ def test_examples_are_measured_as_they_were_made(
     # Two tables: levels are below the other results.
     assert rows == 2 * [drop["file"] for drop in DROPS[:2]]
     assert f"\nand {len(DROPS) - 2} more drops: out/report.json\n" in shown
+    out = Path("out")
     results = {"levels.csv", "criteria.csv", "report.html", "report.json", "report.pdf"}
-    assert set(names_in(tmp_path / "out")) >= results
+    assert set(names_in(out)) >= results
     recording = thud.read_recording(files, config=config)
     truth = np.array([drop["levels"] for drop in DROPS])
     np.testing.assert_allclose(recording.average().drops.level, truth, atol=0.05)
@@ -62,36 +62,32 @@ def test_examples_are_measured_as_they_were_made(
         assert drop.onset == pytest.approx(made["onset"], abs=1e-3)
         np.testing.assert_allclose(drop.levels(), made["levels"], atol=0.05)
         assert drop.contact_time.value == pytest.approx(made["contact_time"], abs=1e-4)
-    with (tmp_path / "out/levels.csv").open() as file:
-        rows = [row for row in csv.DictReader(file) if row["bandwidth"] == "octave"]
-    assert [float(row["level_dB"]) for row in rows] == recording.levels().tolist()
-    report = json.loads((tmp_path / "out/report.json").read_text())
+    table = csv.DictReader((out / "levels.csv").read_text().splitlines())
+    found = [float(row["level_dB"]) for row in table if row["bandwidth"] == "octave"]
+    assert found == recording.levels().tolist()
+    report = json.loads((out / "report.json").read_text())
     assert report["verdict"] == recording.assess().conforms == "does not conform"
-    assert [one["name"] for one in report["criteria"] if one["verdict"] != "conforms"] == [
-        "octave_500"
-    ]
+    failed = [one["name"] for one in report["criteria"] if one["verdict"] != "conforms"]
+    assert failed == ["octave_500"]
+
+
+KNOWN = {"height": 1.0, "mass": 2.5, "height_uncertainty": 0.002, "mass_uncertainty": 0.01}
 
 
 def test_record_of_an_unknown_ball_cannot_be_decided(flagship: thud.Impact) -> None:
     assert recorded(flagship).assess().conforms == "undecided"
-    known = {"height": 1.0, "mass": 2.5, "height_uncertainty": 0.002, "mass_uncertainty": 0.01}
-    verdict = recorded(flagship, **known, calibration_uncertainty=0.001).assess()
+    verdict = recorded(flagship, **KNOWN, calibration_uncertainty=0.001).assess()
     assert verdict.conforms == "conforms"
     assert verdict
 
 
 @pytest.mark.parametrize("channel", ["conforms", "does not conform"])
 def test_uncertainty_that_is_not_stated_never_sharpens_a_verdict(channel: str) -> None:
-    scale = 1.0 if channel == "conforms" else 1.5
-    shape = scale * half_sine(24_000, 0.1, 5280)
-    noise = [np.random.default_rng(k).normal(scale=0.5, size=5280) for k in range(2)]
-    force = np.concatenate([gain * shape + n for gain, n in zip((1.0, 1.004), noise, strict=True)])
-    known = {"height": 1.0, "mass": 2.5, "height_uncertainty": 0.002, "mass_uncertainty": 0.01}
+    shape = half_sine(24_000, 0.1, 5280, 1500 if channel == "conforms" else 2250)
+    force = np.concatenate([noisy(gain * shape, 0.5, k) for k, gain in enumerate((1.0, 1.004))])
 
     def criteria(**stated: float) -> dict[str, Criterion]:
-        recording = thud.read_recording(
-            Signal.from_array(force, 24_000), config=Config(**{**known, **stated})
-        )
+        recording = recording_of(force, 24_000, **{**KNOWN, **stated})
         return {entry.name: entry for entry in recording.assess().criteria}
 
     silent = criteria()
@@ -102,8 +98,8 @@ def test_uncertainty_that_is_not_stated_never_sharpens_a_verdict(channel: str) -
     # At the allowance the verdict turns, whatever the degrees of freedom.
     largest = lowest.allowance / AMPLITUDE_DECIBEL
     for factor, result in ((0.999, channel), (1.001, "undecided")):
-        stated = criteria(calibration_uncertainty=factor * largest)["octave_31_5"]
-        assert stated.conforms == result
+        found = criteria(calibration_uncertainty=factor * largest)
+        assert found["octave_31_5"].conforms == result
     assert silent["contact_time"].conforms == silent["contact_time"].conforms_if_stated
     for key, names in (("mass", {"mass", "restitution"}), ("height", {"drop_height"})):
         without = {f"{key}_uncertainty": None, "calibration_uncertainty": 0.001}
@@ -114,10 +110,16 @@ def test_uncertainty_that_is_not_stated_never_sharpens_a_verdict(channel: str) -
 
 
 def test_configurations_hold_what_files_state() -> None:
+    plate = {"f0": 1100, "Q": np.int64(25), "linearity": [[100, 101.0], [1000.0, 990.0]]}
     stated = Config(
-        date=date(2024, 5, 3), plate={"f0": 1100, "Q": np.int64(25)}, mass=np.float32(2.5)
-    )  # type: ignore[arg-type]
-    assert stated == Config(date="2024-05-03", plate=Plate(1100.0, 25.0), mass=2.5)
+        date=date(2024, 5, 3), plate=plate, mass=np.float32(2.5), instruments=["amplifier 5015"],
+        limits={"octave_500": [10, 15.0]},
+    )  # type: ignore[arg-type]  # fmt: skip
+    assert stated == Config(
+        date="2024-05-03", mass=2.5, instruments=(Instrument("amplifier 5015"),),
+        plate=Plate(1100.0, 25.0, linearity=((100.0, 101.0), (1000.0, 990.0))),
+        limits={"octave_500": (10.0, 15.0)},
+    )  # fmt: skip
     assert type(stated.mass) is float
 
 
@@ -196,11 +198,9 @@ def test_contact_times_of_finite_elements_lie_within_their_uncertainty(name: str
     pulse = impact.floor_force[: int(impact.exact_contact_time * impact.sample_rate) + 2]
     for rate in (44_100.0, 48_000.0):
         for seed, noise in enumerate((0.5, 1.5, 5.0)):
-            level = 20 * np.log10(pulse.max() / noise)
-            force, _ = make_recording(
-                pulse, impact.sample_rate, rate=rate, noise_db=level, seed=seed
-            )
-            found = thud.read_recording(Signal.from_array(force, rate)).estimates["contact_time"]
+            how = {"noise_db": 20 * np.log10(pulse.max() / noise), "seed": seed}
+            force, _ = make_recording(pulse, impact.sample_rate, rate=rate, **how)
+            found = recording_of(force, rate).estimates["contact_time"]
             assert abs(found.value - truth) <= found.expanded
 
 
@@ -250,7 +250,7 @@ def test_peaks_of_noise_are_not_exact() -> None:
     double = pulse * (1 - 0.35 * np.exp(-(((time - 0.01) / 0.002) ** 2)))
     for force, noise_db, expected in ((pulse, 60, 1), (double, 60, 2), (double, 20, np.nan)):
         record, _ = make_recording(force, 48_000, noise_db=noise_db, seed=1)
-        found = thud.read_recording(Signal.from_array(record, 48_000))
+        found = recording_of(record, 48_000)
         np.testing.assert_equal(found.estimates["peaks"].value, expected)
         peaks = next(d for d in found.assess().criteria if d.name == "peak_count")
         known = "conforms" if expected == 1 else "does not conform"
