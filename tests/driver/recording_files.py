@@ -13,6 +13,7 @@ import numpy as np
 import pyuff
 import scipy.io
 import soundfile
+import synthetic
 
 from thud.recordings.config import Config
 from thud.recordings.signal import Signal, open_signals
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     Entry = tuple[str, str, Any]
     HeaderWriter = Callable[[Path, NDArray[np.float64], list[Entry]], None]
 
-PEAK, DURATION, RATE = 1500.0, 0.02, 8000.0
+PEAK, RATE = 1500.0, 8000.0
 
 
 def opened(path: Path | str, **stated: Any) -> list[Signal]:  # noqa: ANN401 - of `Config`
@@ -37,9 +38,7 @@ def opened(path: Path | str, **stated: Any) -> list[Signal]:  # noqa: ANN401 - o
 
 def half_sine(rate: float, before: float = 0.01, after: float = 0.01) -> NDArray[np.float64]:
     """Return samples of the half sine of 1500 N and 20 ms with quiet around it."""
-    time = np.arange(round((before + DURATION + after) * rate)) / rate - before
-    inside = (time > 0) & (time < DURATION)
-    return np.where(inside, PEAK * np.sin(np.pi * time / DURATION), 0.0)
+    return synthetic.half_sine(rate, before, round((before + 0.02 + after) * rate))
 
 
 FORCE = half_sine(RATE)
@@ -62,15 +61,12 @@ def rows_of(row: str | Callable[[int, float, float], str]) -> str:
     return "".join(form(i, i / RATE, force) + "\n" for i, force in enumerate(FORCE))
 
 
-def _sound(kind: str, container: str | None = None) -> Writer:
-    def write(path: Path, values: NDArray[np.float64], rate: float, unit: str) -> None:
-        del unit  # is not held by the format
-        with path.open("w+b") as file:
-            soundfile.write(
-                file, values, round(rate), kind, format=container or path.suffix[1:].upper()
-            )
-
-    return write
+def _sound(path: Path, values: NDArray[np.float64], rate: float, unit: str) -> None:
+    """Write numbers of the kind that the name begins with; the format holds no unit."""
+    del unit
+    kind = path.stem.upper().replace("PCM", "PCM_")
+    with path.open("w+b") as file:
+        soundfile.write(file, values, round(rate), kind, format=path.suffix[1:].upper())
 
 
 def _table(head: str, separator: str, *, comma: bool = False, time: bool = True) -> Writer:
@@ -130,15 +126,13 @@ def universal_record(
     }  # fmt: skip
 
 
-def _universal(binary: int) -> Writer:
-    return lambda path, *recorded: write_universal(path, universal_record(*recorded, binary))
+def _universal(path: Path, *recorded: Any) -> None:  # noqa: ANN401
+    write_universal(path, universal_record(*recorded, binary=path.stem == "binary"))
 
 
-def _matlab(*, packed: bool) -> Writer:
-    def write(path: Path, values: NDArray[np.float64], rate: float, unit: str) -> None:
-        scipy.io.savemat(path, {"Force": values, "Fs": rate, "unit": unit}, do_compression=packed)
-
-    return write
+def _matlab(path: Path, values: NDArray[np.float64], rate: float, unit: str) -> None:
+    variables = {"Force": values, "Fs": rate, "unit": unit}
+    scipy.io.savemat(path, variables, do_compression=path.stem == "packed")
 
 
 def write_matlab(path: Path, values: NDArray[np.float64], entries: list[Entry]) -> None:
@@ -169,14 +163,11 @@ def write_tdms(path: Path, values: NDArray[np.float64], entries: list[Entry]) ->
     for owner, key, value in entries:
         is_rate = key == "Fs"
         properties[owner]["wf_increment" if is_rate else key] = 1 / value if is_rate else value
-    objects = [
-        nptdms.RootObject(properties["file"]),
-        nptdms.GroupObject("plate", properties["group"]),
-    ]
+    owners = nptdms.RootObject(properties["file"]), nptdms.GroupObject("plate", properties["group"])
     with nptdms.TdmsWriter(path) as file:
         for part in np.array_split(values, 3):
             channel = nptdms.ChannelObject("plate", "force", part, properties["array"])
-            file.write_segment([*objects, channel])
+            file.write_segment([*owners, channel])
 
 
 def write_text(path: Path, values: NDArray[np.float64], entries: list[Entry]) -> None:
@@ -203,16 +194,10 @@ def _stating(write: HeaderWriter, unit_key: str, rate_key: str, *others: Entry) 
 
 
 # By name of the file; those of `SOUND` hold no unit.
-SOUND: dict[str, Writer] = {
-    "pcm16.wav": _sound("PCM_16"),
-    "pcm24.wav": _sound("PCM_24"),
-    "pcm32.wav": _sound("PCM_32"),
-    "pcm24.rf64": _sound("PCM_24"),
-    "float.wav": _sound("FLOAT"),
-    "double.wav": _sound("DOUBLE"),
-    "pcm16.flac": _sound("PCM_16"),
-    "pcm24.flac": _sound("PCM_24"),
-}
+SOUND: dict[str, Writer] = dict.fromkeys(
+    ["pcm16.wav", "pcm24.wav", "pcm32.wav", "pcm24.rf64", "float.wav", "double.wav", "pcm16.flac",
+     "pcm24.flac"], _sound,
+)  # fmt: skip
 WITH_UNIT: dict[str, Writer] = {
     "comma.csv": _table("Time [s],Force [{unit}]\n", ","),
     "german.csv": _table("Abtastrate: {rate} Hz\nZeit;Kraft\ns;{unit}\n", ";", comma=True),
@@ -225,19 +210,16 @@ WITH_UNIT: dict[str, Writer] = {
     ),
     "plate.h5": _stating(write_hdf5, "units", "sample_rate", ("file", "date", "2024-05-06")),
     "plate.nc": _netcdf,
-    "text.uff": _universal(0),
-    "binary.uff": _universal(1),
-    "plain.mat": _matlab(packed=False),
-    "packed.mat": _matlab(packed=True),
+    "text.uff": _universal,
+    "binary.uff": _universal,
+    "plain.mat": _matlab,
+    "packed.mat": _matlab,
     "structure.mat": _stating(write_matlab, "unit", "Fs"),
     "v73.mat": _stating(write_matlab_73, "unit", "Fs"),
     "plate.tdms": _stating(
-        write_tdms,
-        "unit_string",
-        "Fs",
-        ("array", "wf_start_time", np.datetime64("2024-05-06T10:00:00")),
+        write_tdms, "unit_string", "Fs", ("array", "wf_start_time", np.datetime64("2024-05-06")),
     ),
-}
+}  # fmt: skip
 WRITERS: dict[str, Writer] = SOUND | WITH_UNIT
 
 

@@ -8,6 +8,7 @@ import re
 import struct
 import sys
 from itertools import product
+from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -16,14 +17,15 @@ import numpy as np
 import pytest
 import soundfile
 from conftest import REPOSITORY, naming, noted
-from hypothesis import HealthCheck, given, settings, strategies as st
+from hypothesis import given, settings, strategies as st
 from recording_files import (
     FORCE,
     RATE,
     WITH_HEADER,
-    WRITERS,
+    noisy,
     opened,
     patch,
+    recording_file,
     universal_record,
     write_hdf5,
     write_tdms,
@@ -36,10 +38,10 @@ from thud.recordings.calibration import calibrate
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from numpy.typing import NDArray
 
+pytestmark = pytest.mark.usefixtures("working_directory")
 TIME = np.arange(FORCE.size) / RATE
 POUND = 4.4482216152605
 # Newtons per unit; None of units that are no force.
@@ -52,7 +54,7 @@ SENSITIVITY = "sensitivity"
 OWNERS = st.sampled_from(["array", "group", "file"])
 
 
-def read(path: Path, **stated: Any) -> NDArray[np.float64]:  # noqa: ANN401
+def read(path: Path | str, **stated: Any) -> NDArray[np.float64]:  # noqa: ANN401
     (signal,) = opened(path, **stated)
     assert signal.sample_rate == pytest.approx(RATE)
     return signal.read(0, signal.n_sample)
@@ -67,9 +69,7 @@ def read(path: Path, **stated: Any) -> NDArray[np.float64]:  # noqa: ANN401
     order=st.permutations([0, 1, 2]),
     is_divided=st.booleans(),
 )
-@settings(
-    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
-)
+@settings(max_examples=60, deadline=None)
 def test_what_a_header_states_is_applied_or_refused(  # noqa: PLR0913 - each is one property
     *,
     name: str,
@@ -79,42 +79,35 @@ def test_what_a_header_states_is_applied_or_refused(  # noqa: PLR0913 - each is 
     owners: tuple[str, str, str],
     order: list[int],
     is_divided: bool,
-    tmp_path: Path,
 ) -> None:
     """Headers around a known force, which stored values are or are not divided by."""
     value = 20.0 if "dB" in factor else 2.5 if factor in OTHERS else value
     if name.endswith("mat") or factor == "Gain [dB]":
         factor = re.sub(r"\W+", "_", factor).strip("_")
-    newtons = UNITS[unit]
-    entries = [
-        (owner, key, stated)
-        for owner, key, stated in zip(
-            owners, ("Fs", "unit", factor), (RATE, unit, value), strict=True
-        )
-        if key and stated != ""
-    ]
-    entries = [entries[k] for k in order if k < len(entries)]
+    newtons, pairs = UNITS[unit], (("Fs", RATE), ("unit", unit), (factor, value))
+    every = [(owner, *pair) for owner, pair in zip(owners, pairs, strict=True)]
+    entries = [every[k] for k in order if every[k][1] and every[k][2] != ""]
     is_applied = name in {"a.h5", "a.nc"} and (owners[2], factor) == ("array", "scale_factor")
     is_known = factor in OTHERS or is_applied or value == 1.0
     is_known = is_known or (factor == SENSITIVITY and bool(newtons) and bool(unit))
     scale = value if is_applied or (is_divided and not is_known) else 1.0
     stored = FORCE / (newtons or 1.0) / scale
-    WITH_HEADER[name](tmp_path / name, stored, entries)
+    WITH_HEADER[name](Path(name), stored, entries)
     if newtons is not None and is_known:
-        np.testing.assert_allclose(read(tmp_path / name), FORCE, atol=1e-6)
+        np.testing.assert_allclose(read(name), FORCE, atol=1e-6)
         return
     with pytest.raises(InputError, match=naming(name)):
-        opened(tmp_path / name)
+        opened(name)
     # A calibration is that of the stored values, and the factor is named in a note.
     peak = float(stored[abs(stored).argmax()]) * (value if is_applied else 1.0)
-    (signal,) = opened(tmp_path / name, calibration=1500.0 / peak, unit="V")
+    (signal,) = opened(name, calibration=1500.0 / peak, unit="V")
     np.testing.assert_allclose(signal.read(0, signal.n_sample), FORCE, atol=1e-6)
     if not is_known and factor != SENSITIVITY:
         assert factor in str(noted(signal.notes, "factor_not_applied").others["factor"])
 
 
-def test_factor_and_offset_of_netcdf_are_applied(tmp_path: Path) -> None:
-    path, rate = tmp_path / "a.h5", ("array", "Fs", RATE)
+def test_factor_and_offset_of_netcdf_are_applied() -> None:
+    path, rate = Path("a.h5"), ("array", "Fs", RATE)
     scaled = [rate, ("array", "scale_factor", 0.25), ("array", "add_offset", -25.0)]
     write_hdf5(path, np.rint((FORCE + 25) / 0.25).astype("i2"), scaled)
     np.testing.assert_allclose(read(path), FORCE, atol=0.125)
@@ -130,7 +123,7 @@ LABELS = {"NONE": 0.0, "N": 1.0, "kN": 1e3, "lbf": POUND, "V": None, "m/s2": Non
 @pytest.mark.parametrize("quantity", [0, 9, 13, 12])
 @pytest.mark.parametrize(("system", "label"), list(product(SYSTEMS, LABELS)))
 def test_units_of_universal_files_are_applied_or_refused(
-    system: str, label: str, quantity: int, tmp_path: Path
+    system: str, label: str, quantity: int
 ) -> None:
     units, newtons = SYSTEMS[system], LABELS[label]
     by_system = 1 / units[1] if units else 1.0
@@ -138,8 +131,7 @@ def test_units_of_universal_files_are_applied_or_refused(
     record = universal_record(FORCE / size, RATE, label, binary=quantity % 2, quantity=quantity)
     head = {"type": 164, "units_code": 9, "temp": 1.0, "temp_offset": 0.0}
     sets = [{**head, "length": units[0], "force": units[1]}] if units else []
-    path = tmp_path / "a.uff"
-    write_universal(path, *sets, record)
+    write_universal(Path("a.uff"), *sets, record)
     is_force = quantity in {9, 13}
     if label == "NONE":
         is_right = is_force or (quantity == 0 and by_system == 1.0)
@@ -147,20 +139,16 @@ def test_units_of_universal_files_are_applied_or_refused(
         agree = not units or not is_force or math.isclose(size, by_system, rel_tol=1e-3)
         is_right = newtons is not None and agree
     if is_right:
-        np.testing.assert_allclose(read(path), FORCE, rtol=1e-6, atol=1e-6)
+        np.testing.assert_allclose(read("a.uff"), FORCE, rtol=1e-6, atol=1e-6)
     else:
         with pytest.raises(InputError, match=r"unit|calibration"):
-            opened(path)
+            opened("a.uff")
 
 
 # Properties of a scale by which stored values are half the force.
 SCALES = {
-    "Linear": {"Linear_Slope": 2.0, "Linear_Y_Intercept": 0.0},
-    "Polynomial": {
-        "Polynomial_Coefficients_Size": 2,
-        "Polynomial_Coefficients[0]": 0.0,
-        "Polynomial_Coefficients[1]": 2.0,
-    },
+    "Linear": {"Slope": 2.0, "Y_Intercept": 0.0},
+    "Polynomial": {"Coefficients_Size": 2, "Coefficients[0]": 0.0, "Coefficients[1]": 2.0},
     "PieceWisePolynomial": {},
     "Reciprocal": {},
 }
@@ -168,34 +156,33 @@ SCALES = {
 
 @pytest.mark.parametrize("kind", SCALES)
 def test_scales_of_tdms_are_applied_or_refused_by_name(
-    kind: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    kind: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    own = {"Scale_Type": kind, f"{kind}_Input_Source": 0xFFFFFFFF, **SCALES[kind]}
+    own = {"Input_Source": 0xFFFFFFFF, **SCALES[kind]}
     properties = {
         "Fs": RATE, "unit_string": "N", "NI_Number_Of_Scales": 1, "NI_Scaling_Status": "unscaled",
-        **{f"NI_Scale[0]_{key}": value for key, value in own.items()},
+        "NI_Scale[0]_Scale_Type": kind,
+        **{f"NI_Scale[0]_{kind}_{key}": value for key, value in own.items()},
     }  # fmt: skip
-    entries = [("array", key, value) for key, value in properties.items()]
-    write_tdms(tmp_path / "a.tdms", FORCE / 2, entries)
+    write_tdms(Path("a.tdms"), FORCE / 2, [("array", *entry) for entry in properties.items()])
     if SCALES[kind]:
-        np.testing.assert_allclose(read(tmp_path / "a.tdms"), FORCE)
+        np.testing.assert_allclose(read("a.tdms"), FORCE)
     else:
         with pytest.raises(InputError, match=naming("a.tdms", kind, "scale")):
-            opened(tmp_path / "a.tdms")
+            opened("a.tdms")
     assert capfd.readouterr() == ("", "")
     loggers = [logging.getLogger(name) for name in logging.root.manager.loggerDict]
     assert not any(logger.filters for logger in loggers if logger.name.startswith("nptdms"))
 
 
 @pytest.mark.parametrize("order", ["little", "big"])
-def test_tdms_that_is_cut_off_anywhere_is_refused(order: str, tmp_path: Path) -> None:
-    path = tmp_path / "a.tdms"
-    WRITERS["plate.tdms"](path, FORCE, RATE, "N")
+def test_tdms_that_is_cut_off_anywhere_is_refused(order: str) -> None:
+    path = recording_file("plate.tdms")
     data = 2 * big_endian_tdms() if order == "big" else path.read_bytes()
     boundary = data.rindex(b"TDSm")
     for cut in {*range(5, len(data), 97), *range(boundary + 1, boundary + 40)}:
         path.write_bytes(data[:cut])
-        with pytest.raises(InputError, match=r"a\.tdms: "):
+        with pytest.raises(InputError, match=r"plate\.tdms: "):
             opened(path)
 
 
@@ -206,15 +193,13 @@ def big_endian_tdms() -> bytes:
         return struct.pack(">I", len(value)) + value.encode()
 
     count, double, string = len(FORCE), 10, 0x20
-    properties = text("wf_increment") + struct.pack(">Id", double, 1 / RATE)
-    properties += text("unit_string") + struct.pack(">I", string) + text("N")
-    index = struct.pack(">IIIQ", 20, double, 1, count)
-    head = struct.pack(">I", 1) + text("/'plate'/'force'") + index + struct.pack(">I", 2)
-    head += properties
+    head = struct.pack(">I", 1) + text("/'plate'/'force'")
+    head += struct.pack(">IIIQI", 20, double, 1, count, 2)
+    head += text("wf_increment") + struct.pack(">Id", double, 1 / RATE)
+    head += text("unit_string") + struct.pack(">I", string) + text("N")
     raw = FORCE.astype(">f8").tobytes()
     # Metadata, new list of objects, raw data, big-endian.
-    contents = 2 + 4 + 8 + 64
-    lead = b"TDSm" + struct.pack("<I", contents)
+    lead = b"TDSm" + struct.pack("<I", 2 + 4 + 8 + 64)
     return lead + struct.pack(">IQQ", 4713, len(head) + len(raw), len(head)) + head + raw
 
 
@@ -259,16 +244,16 @@ def netcdf_times(path: Path, step: float, units: str, **attributes: float) -> No
     ],
 )  # fmt: skip
 def test_other_layouts_are_read(
-    name: str, write: Callable[[Path], None], stated: dict[str, Any], tmp_path: Path
+    name: str, write: Callable[[Path], None], stated: dict[str, Any]
 ) -> None:
-    write(tmp_path / name)
-    np.testing.assert_allclose(read(tmp_path / name, **stated), FORCE, atol=1e-9)
+    write(Path(name))
+    np.testing.assert_allclose(read(name, **stated), FORCE, atol=1e-9)
 
 
 @pytest.mark.parametrize("length", [0xFFFFFFFF, 0x7FFFF000, 0x7FFFFF00])
 @pytest.mark.parametrize("kind", ["PCM_16", "PCM_24", "PCM_32", "FLOAT", "DOUBLE"])
-def test_sound_of_a_stream_is_read_to_its_end(length: int, kind: str, tmp_path: Path) -> None:
-    path = tmp_path / "a.wav"
+def test_sound_of_a_stream_is_read_to_its_end(length: int, kind: str) -> None:
+    path = Path("a.wav")
     soundfile.write(path, FORCE / 5000, 8000, kind)
     whole, at = read(path, calibration=5000.0), path.read_bytes().index(b"data") + 4
     for position in (4, at):
@@ -280,18 +265,14 @@ def test_sound_of_a_stream_is_read_to_its_end(length: int, kind: str, tmp_path: 
         opened(path, calibration=5000.0)
 
 
-def test_calibration_of_a_file_with_a_factor_names_it(tmp_path: Path) -> None:
-    level = np.repeat([0.0, 0.1], 10_000) + np.random.default_rng(3).normal(0, 1e-4, 20_000)
+def test_calibration_of_a_file_with_a_factor_names_it() -> None:
     entries = [("array", "Fs", RATE), ("array", "unit", "V"), ("array", "gain", 10.0)]
-    write_hdf5(tmp_path / "a.h5", level, entries)
-    found = calibrate(tmp_path / "a.h5", force=500.0, uncertainty=0.01)
-    note = found.notes[-1]
+    write_hdf5(Path("a.h5"), noisy(np.repeat([0.0, 0.1], 10_000), 1e-4, 3), entries)
+    note = calibrate("a.h5", force=500.0, uncertainty=0.01).notes[-1]
     assert (note.code, note.others) == ("stored_values_calibrated", {"factor": "gain = 10.0"})
 
 
-def test_format_is_added_by_one_file_and_one_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_format_is_added_by_one_file_and_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
     """The example of docs/how_to_add.md."""
     page = (REPOSITORY / "docs/how_to_add.md").read_text().partition("## A file format")[2]
     source, line = re.findall(r"```python\n(.*?)```", page, re.DOTALL)[:2]
@@ -300,9 +281,8 @@ def test_format_is_added_by_one_file_and_one_line(
     monkeypatch.setitem(sys.modules, module.__name__, module)
     (entry,) = eval(f"[{line}]", vars(formats))  # noqa: S307
     monkeypatch.setattr(formats, "FORMATS", (*formats.FORMATS[:-1], entry, formats.FORMATS[-1]))
-    np.save(tmp_path / "force.npy", np.column_stack([TIME, FORCE]))
+    np.save("force.npy", np.column_stack([TIME, FORCE]))
     with pytest.raises(InputError, match=naming("sample_rate")):
-        opened(tmp_path / "force.npy", channel=2)
-    np.testing.assert_array_equal(
-        read(tmp_path / "force.npy", channel=2, sample_rate=RATE, unit="N"), FORCE
-    )
+        opened("force.npy", channel=2)
+    found = read("force.npy", channel=2, sample_rate=RATE, unit="N")
+    np.testing.assert_array_equal(found, FORCE)
