@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from conftest import codes, naming, noted
 from recording_files import noisy
+from refusals.core import write
 from scipy.signal import cont2discrete, lfilter
 
 from thud import InputError, cli
@@ -20,17 +21,14 @@ from thud.recordings.plate_tap import TappedPlate, calibrate_tap
 from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
-    from numpy.typing import NDArray
-
     from thud.recordings.force_units import Calibration
 
+pytestmark = pytest.mark.usefixtures("working_directory")
 RATE = 1000.0
 FORCE = 250.0
 
 
-def high_pass(level: NDArray[np.float64], time_constant: float) -> NDArray[np.float64]:
+def high_pass(level: np.ndarray, time_constant: float) -> np.ndarray:
     """Return the exact response of a first-order high-pass to lines between the samples."""
     if math.isinf(time_constant):
         return level
@@ -39,7 +37,7 @@ def high_pass(level: NDArray[np.float64], time_constant: float) -> NDArray[np.fl
     return np.asarray(lfilter([gain, -gain], [1, -decay], level))
 
 
-def load(ends: list[float], ramp: float, duration: float) -> NDArray[np.float64]:
+def load(ends: list[float], ramp: float, duration: float) -> np.ndarray:
     """Return a weight, 1, that is put on and taken off from these times on within a ramp, s."""
     time = np.arange(0, duration, 1 / RATE)
     turns = [(-1) ** k * np.clip((time - end) / ramp, 0, 1) for k, end in enumerate(ends)]
@@ -54,7 +52,7 @@ def recorded(  # noqa: PLR0913 - what differs between records
     rest: float = 5.0,
     ramp: float = 0.5,
     noise: float = 0.01,
-) -> NDArray[np.float64]:
+) -> np.ndarray:
     """Return the record of a step of 1 V with offset, drift and noise."""
     ends = [5.0] if single else [5.0, 5.0 + rest]
     level = high_pass(load(ends, ramp, 5 + rest + 5 * (not single)), time_constant)
@@ -62,7 +60,7 @@ def recorded(  # noqa: PLR0913 - what differs between records
     return level + rng.normal(0, noise, level.size) + 0.3 + 3e-6 * np.arange(level.size)
 
 
-def calibrated(level: NDArray[np.float64]) -> tuple[Calibration, float, float]:
+def calibrated(level: np.ndarray) -> tuple[Calibration, float, float]:
     """Return the calibration, its relative error for a step of 1 V, and its uncertainty."""
     found = calibrate(Signal.from_array(level, RATE), force=FORCE, unit="V")
     assert found.uncertainty is not None
@@ -70,17 +68,14 @@ def calibrated(level: NDArray[np.float64]) -> tuple[Calibration, float, float]:
 
 
 @pytest.mark.parametrize(
-    ("time_constant", "single", "ramp"),
+    ("constant", "single", "ramp"),
     [(30.0, False, 0.1), (10.0, True, 1.0), (5.0, False, 0.1), (2.0, True, 1.0)],
 )
-def test_droop_of_the_amplifier_is_taken_off(
-    time_constant: float, ramp: float, *, single: bool
-) -> None:
-    found, error, uncertainty = calibrated(recorded(time_constant, 3, single=single, ramp=ramp))
+def test_droop_of_the_amplifier_is_taken_off(constant: float, ramp: float, *, single: bool) -> None:
+    found, error, uncertainty = calibrated(recorded(constant, 3, single=single, ramp=ramp))
     assert abs(error) < 3.5 * uncertainty < 0.014
     droop = noted(found.notes, "droop_removed")
-    relative = float(droop.others["uncertainty"])
-    assert abs(droop.value / time_constant - 1) < 3.5 * relative < 0.35
+    assert abs(droop.value / constant - 1) < 3.5 * float(droop.others["uncertainty"]) < 0.35
     assert droop.low < droop.value
 
 
@@ -88,46 +83,41 @@ def test_droop_of_the_amplifier_is_taken_off(
 @pytest.mark.parametrize("single", [False, True])
 def test_error_is_as_large_as_the_stated_uncertainty(time_constant: float, *, single: bool) -> None:
     """Of 40 normal errors 0 to 6 lie outside 95 %, with a probability of 99.6 %."""
-    outside = 0
-    for seed in range(40):
-        level = recorded(time_constant, seed, single=single, ramp=0.7)
-        _, error, uncertainty = calibrated(level)
-        outside += abs(error) > 1.96 * uncertainty
-    assert outside <= 6
+    levels = [recorded(time_constant, seed, single=single, ramp=0.7) for seed in range(40)]
+    found = [calibrated(level) for level in levels]
+    assert sum(abs(error) > 1.96 * uncertainty for _, error, uncertainty in found) <= 6
 
 
 TIME = np.arange(0, 15, 1 / RATE)
 
 
-def pressed(end: float) -> NDArray[np.float64]:
+def pressed(end: float) -> np.ndarray:
     """Return a weight on which a hand presses while it is put on."""
     after = np.maximum(TIME - end, 0)
     return 1 - np.exp(-after / 0.15) + 0.4 * np.exp(-(((TIME - end - 0.3) / 0.15) ** 2))
 
 
-def crept(end: float) -> NDArray[np.float64]:
+def crept(end: float) -> np.ndarray:
     return np.log1p(np.maximum(TIME - end, 0) / 0.5)
+
+
+STEADY, DROOPED = recorded(math.inf, 1), recorded(10.0, 1, noise=0.0) - 0.3
+BEFORE = high_pass(load([1.0, 12.0], 0.3, 20.0), 8.0)[4000:]
 
 
 @pytest.mark.parametrize(
     ("level", "limit"),
     [
         # Two levels of 7 s and one of 3.5 s: 0.0002 V without drift and droop.
-        pytest.param(recorded(math.inf, 1), 0.0015, id="no droop"),
-        pytest.param(
-            noisy(high_pass(load([1.0, 12.0], 0.3, 20.0), 8.0)[4000:], 0.003), 0.006, id="on before"
-        ),
+        pytest.param(STEADY, 0.0015, id="no droop"),
+        pytest.param(noisy(BEFORE, 0.003), 0.006, id="on before"),
         pytest.param(noisy(high_pass(pressed(5.0) - pressed(10.0), 5.0), 0.005), 0.003, id="hand"),
-        pytest.param(
-            recorded(math.inf, 1) + 0.05 * np.linspace(0, 1, TIME.size) ** 2, 0.001, id="drift"
-        ),
+        pytest.param(STEADY + 0.05 * np.linspace(0, 1, TIME.size) ** 2, 0.001, id="drift"),
         # 10 and 30 s are hardly distinguished from 7.5 s, 1 % off.
-        pytest.param(
-            noisy(high_pass(recorded(10.0, 4, noise=0.0) - 0.3, 30.0), 0.01, 6), 0.02, id="two"
-        ),
+        pytest.param(noisy(high_pass(DROOPED, 30.0), 0.01, 6), 0.02, id="two"),
     ],
 )
-def test_record_is_within_its_uncertainty(level: NDArray[np.float64], limit: float) -> None:
+def test_record_is_within_its_uncertainty(level: np.ndarray, limit: float) -> None:
     _, error, uncertainty = calibrated(level)
     assert abs(error) < 3.5 * uncertainty < 3.5 * limit
 
@@ -135,24 +125,26 @@ def test_record_is_within_its_uncertainty(level: NDArray[np.float64], limit: flo
 @pytest.mark.parametrize(
     ("level", "words"),
     [
-        *(
-            (noisy(high_pass(recorded(10.0, 1, noise=0.0) - 0.3, second), 0.01), "exponential")
-            for second in (20.0, 5.0, 1.0)
-        ),
-        (recorded(math.inf, 1) + 0.01 * (crept(5.0) - crept(10.0)), "exponential"),
+        *((noisy(high_pass(DROOPED, s), 0.01), "exponential") for s in (20.0, 5.0, 1.0)),
+        (STEADY + 0.01 * (crept(5.0) - crept(10.0)), "exponential"),
         (recorded(1.0, 1), "decays"),
         # The load, the noise above the load, and the rest; they are 0.3 and 1.3 V.
-        *(
-            (np.clip(recorded(math.inf, 1), *limits), "clipped")
-            for limits in ((-1.0, 1.2), (-1.0, 1.3), (0.31, 2.0))
-        ),
+        *((np.clip(STEADY, *ends), "clipped") for ends in ((-1.0, 1.2), (-1.0, 1.3), (0.31, 2.0))),
     ],
 )
-def test_records_that_are_no_calibration_are_refused(
-    level: NDArray[np.float64], words: str
-) -> None:
+def test_records_that_are_no_calibration_are_refused(level: np.ndarray, words: str) -> None:
     with pytest.raises(InputError, match=naming("recording", words)):
         calibrated(level)
+
+
+def shown_of(
+    options: str, columns: str, level: np.ndarray, rate: float, capsys: pytest.CaptureFixture[str]
+) -> tuple[str, str]:
+    """Return what `calibrate` prints of a table, and its warnings."""
+    rows = np.column_stack([np.arange(level.size) / rate, level])
+    np.savetxt("record.csv", rows, "%.6f", ",", header=columns, comments="")
+    assert cli.main(["calibrate", "record.csv", *options.split()]) == 0
+    return capsys.readouterr()
 
 
 @pytest.mark.parametrize(
@@ -165,24 +157,16 @@ def test_records_that_are_no_calibration_are_refused(
     ],
 )
 def test_command_prints_the_calibration_and_names_what_is_lacking(
-    options: str,
-    origin: str,
-    lacking: str | None,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    options: str, origin: str, lacking: str | None, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    rows = np.column_stack([TIME, recorded(5.0, 1)])
-    path = tmp_path / "weight.csv"
-    np.savetxt(path, rows, "%.6f", ",", header="Time [s],Force [V]", comments="")
-    assert cli.main(["calibrate", str(path), *options.split()]) == 0
-    shown = capsys.readouterr()
-    lines = tomllib.loads(shown.out)
+    out, err = shown_of(options, "Time [s],Force [V]", recorded(5.0, 1), RATE, capsys)
+    lines = tomllib.loads(out)
     assert float(lines["calibration"].split()[0]) == pytest.approx(FORCE, rel=0.004)
     assert 1e-4 < lines["calibration_uncertainty"] < 0.004
-    assert origin in shown.out
+    assert origin in out
     # The time constant, s.
-    assert re.search(r"\b[45]\.\d+ s\b", shown.out)
-    assert (lacking in shown.err) if lacking else not shown.err
+    assert re.search(r"\b[45]\.\d+ s\b", out)
+    assert (lacking in err) if lacking else not err
 
 
 def test_gravity_of_a_mass_is_stated_or_counts_as_uncertainty() -> None:
@@ -215,14 +199,14 @@ def test_steps_in_one_direction_are_each_the_whole_force() -> None:
     assert abs(error) < 0.01
     assert codes(found.notes)[1:] == ["steps_in_one_direction", "known_force_uncertain"]
     assert found.notes[1].value == FORCE
-    found, *_ = calibrated(recorded(math.inf, 1))
+    found, *_ = calibrated(STEADY)
     assert codes(found.notes) == ["no_droop", "known_force_uncertain"]
     assert 100 < found.notes[0].low < 1e5
 
 
-def test_record_without_times_has_no_time_constant(tmp_path: Path) -> None:
-    np.savetxt(tmp_path / "weight.csv", recorded(10.0, 1), header="Force [V]", comments="")
-    found = calibrate(tmp_path / "weight.csv", force=FORCE)
+def test_record_without_times_has_no_time_constant() -> None:
+    np.savetxt("weight.csv", recorded(10.0, 1), header="Force [V]", comments="")
+    found = calibrate("weight.csv", force=FORCE)
     assert float(found.chain.split()[0]) == pytest.approx(FORCE, rel=0.004)
     assert codes(found.notes) == ["known_force_uncertain"]
 
@@ -263,6 +247,11 @@ def tapped(  # noqa: PLR0913 - what differs between records
         level += share * lfilter(numerator.ravel(), denominator, force)
     level += noise * rng.normal(size=time.size) + 0.1 + hum * np.sin(2 * np.pi * 50 * time)
     return Signal.from_array(level, rate)
+
+
+def joined(*records: Signal) -> Signal:
+    level = np.concatenate([record.read(0, record.n_sample) for record in records])
+    return Signal.from_array(level, records[0].sample_rate)
 
 
 def deviations(found: TappedPlate, frequency: float, quality: float) -> tuple[float, float]:
@@ -318,9 +307,7 @@ def test_errors_of_taps_are_as_large_as_stated() -> None:
 
 
 def test_taps_that_differ_count_by_their_scatter() -> None:
-    one, other = (tapped([(frequency, 30.0, 1.0)], 1, count=2) for frequency in (1100.0, 1122.0))
-    level = np.concatenate([one.read(0, one.n_sample), other.read(0, other.n_sample)])
-    found = calibrate_tap(Signal.from_array(level, one.sample_rate))
+    found = calibrate_tap(joined(*(tapped([(f, 30.0, 1.0)], 1, count=2) for f in (1100.0, 1122.0))))
     assert found.count == 4
     assert found.frequency == pytest.approx(1111, rel=1e-3)
     # The standard deviation of the mean, 6.4 Hz, times 3.18/1.96 for four taps.
@@ -331,8 +318,7 @@ def test_taps_that_differ_count_by_their_scatter() -> None:
 def test_tap_of_a_hammer_that_hits_twice_does_not_count(rebound: float) -> None:
     once = tapped([(1100.0, 25.0, 1.0)], 1, count=2)
     twice = tapped([(1100.0, 25.0, 1.0)], 2, rebound=rebound)
-    level = np.concatenate([record.read(0, record.n_sample) for record in (once, twice)])
-    found = calibrate_tap(Signal.from_array(level, once.sample_rate))
+    found = calibrate_tap(joined(once, twice))
     assert (found.count, found.notes) == (2, ())
     assert np.abs(deviations(found, 1100, 25)).max() < 4
     assert found.frequency_uncertainty < 2e-4
@@ -341,7 +327,7 @@ def test_tap_of_a_hammer_that_hits_twice_does_not_count(rebound: float) -> None:
     except InputError as error:
         assert re.search(naming("resonance", "known to"), str(error))
     else:
-        assert [note.code for note in alone.notes] == ["tap_misfit"]
+        assert codes(alone.notes) == ["tap_misfit"]
         assert np.abs(deviations(alone, 1100, 25)).max() < 3
 
 
@@ -352,7 +338,7 @@ def test_misfit_of_close_modes_counts_as_uncertainty(second: float, quality: flo
     found = calibrate_tap(tapped(modes, 1, noise=1e-4))
     assert np.abs(deviations(found, 660 + 0.4 * second, quality)).max() < 3
     assert found.quality_uncertainty > 0.01
-    assert [note.code for note in found.notes] == ["tap_misfit"]
+    assert codes(found.notes) == ["tap_misfit"]
 
 
 def test_clock_of_the_recorder_limits_the_frequency() -> None:
@@ -366,22 +352,15 @@ def test_second_resonance_is_stated() -> None:
     assert found.others == pytest.approx([2300], rel=1e-3)
 
 
-def test_command_prints_the_lines_of_the_plate(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_command_prints_the_lines_of_the_plate(capsys: pytest.CaptureFixture[str]) -> None:
     record = tapped([(1100.0, 30.0, 1.0)], 1, count=2)
-    path = tmp_path / "tap.csv"
     level = record.read(0, record.n_sample)
-    rows = np.column_stack([np.arange(level.size) / record.sample_rate, level])
-    np.savetxt(path, rows, "%.6f", ",", header="Time [s],Level", comments="")
-    assert cli.main(["calibrate", "--tap", str(path)]) == 0
-    shown = capsys.readouterr()
-    (tmp_path / "lab.toml").write_text(shown.out)
-    plate = read_config(tmp_path / "lab.toml").plate
+    out, err = shown_of("--tap", "Time [s],Level", level, record.sample_rate, capsys)
+    plate = read_config(write("lab.toml", out)).plate
     assert plate is not None
     assert plate.f0 == pytest.approx(1100, rel=1e-3)
     assert abs(plate.Q - 30) < 0.6
     assert plate.f0_uncertainty is not None
     assert 1e-6 < plate.f0_uncertainty < 1e-3
-    assert "# 2 taps in" in shown.out
-    assert not shown.err
+    assert "# 2 taps in" in out
+    assert not err

@@ -5,14 +5,15 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import h5py
 import numpy as np
 import pytest
 import soundfile
 from conftest import codes, naming, noted
-from recording_files import opened
+from recording_files import noisy, opened
+from refusals.core import write
 from scipy import stats
 from synthetic import half_sine, make_drop
 
@@ -25,11 +26,7 @@ from thud.recordings.force_units import Calibration
 from thud.recordings.recorded_levels import average_levels, measure_levels
 from thud.recordings.signal import Signal
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
+pytestmark = pytest.mark.usefixtures("working_directory")
 RATE = 16_000
 SHARES = (0.2, 0.32, 0.14, 0.34)
 NAMES = ["F1", "F2", "F3", "F4"]
@@ -37,7 +34,7 @@ NAMES = ["F1", "F2", "F3", "F4"]
 
 def record(
     seed: int, *, count: int = 1, noise: float = 1.0, share: float = 1.0, before: float = 0.1
-) -> NDArray[np.float64]:
+) -> np.ndarray:
     """Return drops that differ by some thousandths, with a bounce each, N."""
     length = round((before + 1.5 * count) * RATE)
     force = np.zeros(length)
@@ -52,45 +49,40 @@ CELLS = [record(i, share=share) for i, share in enumerate(SHARES)]
 
 
 def write_cells(
-    path: Path,
-    columns: Sequence[NDArray[np.float64]] = CELLS,
-    names: Sequence[str] = NAMES,
-    unit: str = "N",
+    path: str, columns: list[np.ndarray] = CELLS, names: list[str] = NAMES, unit: str = "N"
 ) -> Path:
     with h5py.File(path, "w") as file:
         file.attrs["Fs"] = RATE
         for name, column in zip(names, columns, strict=True):
             file[name] = column
             file[name].attrs["unit"] = unit
-    return path
+    return Path(path)
 
 
-def write_wav(path: Path, columns: Sequence[NDArray[np.float64]], kind: str = "PCM_24") -> Path:
-    with path.open("w+b") as file:
-        soundfile.write(file, np.column_stack(columns), RATE, kind, format=path.suffix[1:].upper())
-    return path
+def write_wav(path: str, *columns: np.ndarray, kind: str = "PCM_24") -> Path:
+    with Path(path).open("w+b") as file:
+        soundfile.write(file, np.column_stack(columns), RATE, kind, format=path[-4:].strip("."))
+    return Path(path)
 
 
 @pytest.mark.parametrize(
     "channels", ["sum", " Sum ", "F1+F2+F3+F4", "F4 + 2+3+1", ["F1", "F2", 4, "f3"]]
 )
-def test_load_cells_are_added(channels: Any, tmp_path: Path) -> None:  # noqa: ANN401
-    (signal,) = opened(write_cells(tmp_path / "cells.h5"), channels=channels)
+def test_load_cells_are_added(channels: Any) -> None:  # noqa: ANN401
+    (signal,) = opened(write_cells("cells.h5"), channels=channels)
     np.testing.assert_allclose(signal.read(0, signal.n_sample), sum(CELLS), atol=1e-9)
     assert noted(signal.notes, "cells_added").value == 4
 
 
-def test_sum_is_measured_as_one_force(tmp_path: Path) -> None:
-    found = summed(tmp_path / "cells.h5")
+def test_sum_is_measured_as_one_force() -> None:
     expected = thud.read_recording(Signal.from_array(sum(CELLS), RATE))
-    np.testing.assert_allclose(found.levels(), expected.levels(), atol=1e-9)
+    np.testing.assert_allclose(summed().levels(), expected.levels(), atol=1e-9)
 
 
-def test_each_load_cell_has_its_calibration(tmp_path: Path) -> None:
+def test_each_load_cell_has_its_calibration() -> None:
     chains = ["10 V/FS, 2 mV/N", "10 V/FS, 4 mV/N", "10 V/FS, 5 mV/N", 2500.0]
     scales = (5000.0, 2500.0, 2000.0, 2500.0)
-    columns = [force / scale for force, scale in zip(CELLS, scales, strict=True)]
-    path = write_wav(tmp_path / "cells.wav", columns)
+    path = write_wav("cells.wav", *np.divide(CELLS, np.array(scales)[:, None]))
     (signal,) = opened(path, channels="sum", calibration=chains)
     force = signal.read(0, signal.n_sample)
     np.testing.assert_allclose(force, sum(CELLS), atol=1e-2)
@@ -103,11 +95,10 @@ def test_each_load_cell_has_its_calibration(tmp_path: Path) -> None:
     np.testing.assert_array_equal(signal.read(0, signal.n_sample), force)
 
 
-def test_a_configuration_selects_and_calibrates_channels(tmp_path: Path) -> None:
-    path = write_cells(tmp_path / "cells.h5", unit="V")
-    lab = tmp_path / "lab.toml"
-    lab.write_text('channels = "F1+F2+F3+F4"\ncalibration = ["1 N/V", 1, "1", "0.001 N/mV"]\n')
-    config = read_config(lab)
+def test_a_configuration_selects_and_calibrates_channels() -> None:
+    path = write_cells("cells.h5", unit="V")
+    text = 'channels = "F1+F2+F3+F4"\ncalibration = ["1 N/V", 1, "1", "0.001 N/mV"]\n'
+    config = read_config(lab := write("lab.toml", text))
     assert config.channels == tuple(NAMES)
     assert config.calibration == (Calibration("1 N/V"), 1.0, 1.0, Calibration("0.001 N/mV"))
     assert thud.read_recording(path, config=lab).peak_force == pytest.approx(1500, rel=0.01)
@@ -115,25 +106,23 @@ def test_a_configuration_selects_and_calibrates_channels(tmp_path: Path) -> None
     assert one.peak_force == pytest.approx(SHARES[3] * 1500, rel=0.01)
 
 
-def test_command_line_selects_and_calibrates_channels(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = write_wav(tmp_path / "cells.wav", [force / 2500 for force in CELLS])
-    command = ["measure", str(path), "--output", str(tmp_path / "out"), "--no-figures"]
+def test_command_line_selects_and_calibrates_channels(capsys: pytest.CaptureFixture[str]) -> None:
+    write_wav("cells.wav", *np.divide(CELLS, 2500))
+    command = ["measure", "cells.wav", "--output", "out", "--no-figures", "--channels", "1+2+3+4"]
     # A bare number is N per full scale, as in the configuration.
-    assert cli.main([*command, "--channels", "1+2+3+4", *4 * ["--calibration", "2500"]]) == 0
+    assert cli.main([*command, *4 * ["--calibration", "2500"]]) == 0
     assert re.search(r" (1499|150\d)\b", capsys.readouterr().out)
 
 
-def test_one_force_among_other_channels_needs_no_choice(tmp_path: Path) -> None:
-    path = write_cells(tmp_path / "mixed.h5", [record(0), record(1, share=0.0)], ["F", "trigger"])
+def test_one_force_among_other_channels_needs_no_choice() -> None:
+    path = write_cells("mixed.h5", [record(0), record(1, share=0.0)], ["F", "trigger"])
     with h5py.File(path, "r+") as file:
         file["trigger"].attrs["unit"] = "V"
     assert thud.read_recording(path).peak_force == pytest.approx(1500, rel=0.01)
 
 
-def test_forces_that_are_left_out_are_named(tmp_path: Path) -> None:
-    path = write_cells(tmp_path / "cells.h5")
+def test_forces_that_are_left_out_are_named() -> None:
+    path = write_cells("cells.h5")
     for stated, missing in (({"channel": "F1"}, "F2, F3, F4"), ({"channels": "F1+F2+F3"}, "F4")):
         (signal,) = opened(path, **stated)
         assert noted(signal.notes, "forces_left_out").others["channels"] == missing
@@ -141,21 +130,21 @@ def test_forces_that_are_left_out_are_named(tmp_path: Path) -> None:
     # The sum of load cells, small lateral forces, and a channel without any signal.
     force = sum(CELLS)
     columns = [*CELLS, force, 0.01 * force, np.ones(len(force))]
-    path = write_cells(tmp_path / "plate.h5", columns, [*NAMES, "Fz", "Fx", "F0"])
+    path = write_cells("plate.h5", columns, [*NAMES, "Fz", "Fx", "F0"])
     for stated in ({"channel": "Fz"}, {"channels": "F1+F2+F3+F4"}):
         assert not any(note.is_warning for note in opened(path, **stated)[0].notes)
 
 
-def summed(path: Path, **changed: NDArray[np.float64]) -> thud.Recording:
+def summed(**changed: np.ndarray) -> thud.Recording:
     """Return the recording of the sum of four load cells, some of them changed."""
     columns = dict(zip(NAMES, CELLS, strict=True)) | changed
-    return thud.read_recording(
-        write_cells(path, [*columns.values()]), config=Config(channels="sum")
-    )
+    path = write_cells("cells.h5", [*columns.values()])
+    return thud.read_recording(path, config=Config(channels="sum"))
 
 
-AT = round(0.11 * RATE)
-LOST = (np.arange(CELLS[0].size) >= AT) & (np.arange(CELLS[0].size) < AT + 8)
+# Samples after 10 ms of the contact.
+LATER = np.arange(CELLS[0].size) - round(0.11 * RATE)
+LOST = (LATER >= 0) & (LATER < 8)
 
 
 @pytest.mark.parametrize(
@@ -165,36 +154,31 @@ LOST = (np.arange(CELLS[0].size) >= AT) & (np.arange(CELLS[0].size) < AT + 8)
         (np.where(LOST, 0.0, CELLS[0]), naming("F1", "8 samples", "lost")),
     ],
 )
-def test_load_cells_that_fail_are_refused(
-    changed: NDArray[np.float64], words: str, tmp_path: Path
-) -> None:
+def test_load_cells_that_fail_are_refused(changed: np.ndarray, words: str) -> None:
     with pytest.raises(InputError, match=words):
-        summed(tmp_path / "cells.h5", F1=changed)
+        summed(F1=changed)
 
 
-def test_faults_of_single_load_cells_are_found(tmp_path: Path) -> None:
-    path, first = tmp_path / "cells.h5", CELLS[0]
-    found = summed(path, F1=np.where(np.arange(first.size) == AT, 0.0, first))
+def test_faults_of_single_load_cells_are_found() -> None:
+    found = summed(F1=np.where(LATER == 0, 0.0, CELLS[0]))
     spikes = noted(found.notes, "spikes")
     assert (spikes.others["part"], spikes.value) == ("cells.h5, F1", pytest.approx(0.0625))
-    np.testing.assert_allclose(found.levels(), summed(path).levels(), atol=0.02)
-    for code, changed in (("cell_sign", -first), ("cell_without_force", record(9, share=0.0))):
-        parts = {n.others["part"] for n in summed(path, F1=changed).notes if n.code == code}
+    np.testing.assert_allclose(found.levels(), summed().levels(), atol=0.02)
+    for code, changed in (("cell_sign", -CELLS[0]), ("cell_without_force", record(9, share=0.0))):
+        parts = {n.others["part"] for n in summed(F1=changed).notes if n.code == code}
         assert parts == {"cells.h5, F1"}
 
 
-def test_inverted_load_cell_does_not_make_another_one_the_sum(tmp_path: Path) -> None:
+def test_inverted_load_cell_does_not_make_another_one_the_sum() -> None:
     cells = {name: record(i, share=0.25) for i, name in enumerate(NAMES)}
-    found = summed(tmp_path / "cells.h5", **cells | {"F4": -cells["F4"]})
-    note = noted(found.notes, "cell_sign")
+    note = noted(summed(**cells | {"F4": -cells["F4"]}).notes, "cell_sign")
     assert (note.others["part"], note.value) == ("cells.h5, F4", pytest.approx(-375, rel=0.01))
 
 
-def test_one_drop_on_each_of_two_plates(tmp_path: Path) -> None:
+def test_one_drop_on_each_of_two_plates() -> None:
     empty = record(2, share=0.0)
     plates = [np.append(record(0), empty), np.append(empty, record(1))]
-    path = write_cells(tmp_path / "plates.h5", plates, NAMES[:2])
-    assert len(thud.read_recording(path).drops) == 2
+    assert len(thud.read_recording(write_cells("plates.h5", plates, NAMES[:2])).drops) == 2
 
 
 @pytest.mark.parametrize(
@@ -210,24 +194,24 @@ def test_one_drop_on_each_of_two_plates(tmp_path: Path) -> None:
     ],
 )
 def test_records_of_the_same_drops_are_refused(
-    name: str, kind: str, start: float, noise: float, tmp_path: Path
+    name: str, kind: str, start: float, noise: float
 ) -> None:
-    def write(file: str, force: NDArray[np.float64], kind: str, start: float = start) -> Path:
+    def written(file: str, force: np.ndarray, kind: str, start: float = start) -> Path:
         force = force[round(start * RATE) :]
-        if file.endswith("h5"):
-            return write_cells(tmp_path / file, [np.round(force + 20, 1)], ["F"])
-        return write_wav(tmp_path / file, [force / 2000], kind)
+        if not kind:
+            return write_cells(file, [np.round(force + 20, 1)], ["F"])
+        return write_wav(file, force / 2000, kind=kind)
 
     stated = {"calibration": 2000} if kind else {}
     force, suffix = record(7, count=2, noise=noise), Path(name).suffix
-    first = write(f"first{suffix}", force, "PCM_16" if suffix == ".flac" else "PCM_24", 0.0)
+    first = written(f"first{suffix}", force, kind and ("PCM_24", "PCM_16")[suffix == ".flac"], 0.0)
     with pytest.raises(InputError, match=naming(name, first.name)):
-        thud.read_recording([first, write(name, force, kind)], **stated)
-    other = write(f"other{suffix}", record(8, count=2, noise=noise), kind)
+        thud.read_recording([first, written(name, force, kind)], **stated)
+    other = written(f"other{suffix}", record(8, count=2, noise=noise), kind)
     assert len(thud.read_recording([first, other], **stated).drops) >= 3
 
 
-def test_hum_and_tones_do_not_make_drops_equal(tmp_path: Path) -> None:
+def test_hum_and_tones_do_not_make_drops_equal() -> None:
     paths = []
     for seed in range(4):
         force = record(seed, noise=0.3)
@@ -235,8 +219,7 @@ def test_hum_and_tones_do_not_make_drops_equal(tmp_path: Path) -> None:
         force += 40 * np.sin(2 * np.pi * 50 * time) + 15 * np.sin(2 * np.pi * 250 * time)
         # Interference that a shift brings into phase; drops are not alike to 1 N.
         force += 2 * np.sin(2 * np.pi * 4300 * time + seed)
-        force *= 1 + 0.003 * seed
-        paths.append(write_wav(tmp_path / f"drop_{seed}.wav", [force / 2000]))
+        paths.append(write_wav(f"drop_{seed}.wav", (1 + 0.003 * seed) * force / 2000))
     assert len(thud.read_recording(paths, calibration=2000).drops) == 4
 
 
@@ -244,13 +227,8 @@ def test_hum_and_tones_do_not_make_drops_equal(tmp_path: Path) -> None:
     ("rate", "before"), [(2500.0, 0.005), (2500.0, 0.012), (5000.0, 0.002), (5000.0, 0.004)]
 )
 def test_drops_differ_also_with_little_background(rate: float, before: float) -> None:
-    length = round((before + 0.12) * rate)
-    signals = [
-        Signal.from_array(
-            half_sine(rate, before, length) + np.random.default_rng(k).normal(scale=9, size=length),
-            rate, f"drop {k}",
-        ) for k in range(2)
-    ]  # fmt: skip
+    force = half_sine(rate, before, round((before + 0.12) * rate))
+    signals = [Signal.from_array(noisy(force, 9, k), rate, f"drop {k}") for k in range(2)]
     assert len(thud.read_recording(signals).drops) == 2
 
 

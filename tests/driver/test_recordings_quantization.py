@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -17,9 +16,6 @@ from thud.recordings.measured_drop import GRAVITY
 from thud.recordings.repair import find_quantization
 from thud.recordings.signal import Signal
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
 RATE = 48_000.0
 SPEED, RESTITUTION = math.sqrt(2 * GRAVITY), 0.75
 MASS = 2 * 1500 * 0.02 / np.pi / (SPEED * (1 + RESTITUTION) + GRAVITY * ABOVE)
@@ -28,7 +24,7 @@ EXACT = dict.fromkeys(("mass_uncertainty", "height_uncertainty", "calibration_un
 COARSE = 15.625
 
 
-def record(step: float, noise: float, seed: int, count: int = 1) -> NDArray[np.float64]:
+def record(step: float, noise: float, seed: int, count: int = 1) -> np.ndarray:
     """Return half sines on an offset, with noise, rounded to a step, N."""
     rng = np.random.default_rng(seed)
     length = round((0.2 + 1.5 * count) * RATE)
@@ -38,21 +34,20 @@ def record(step: float, noise: float, seed: int, count: int = 1) -> NDArray[np.f
     return np.rint(force / step) * step
 
 
-def measured(force: NDArray[np.float64]) -> thud.Recording:
+def measured(force: np.ndarray) -> thud.Recording:
     return recording_of(force, RATE, mass=MASS, height=1.0, **EXACT)
 
 
-def quantized(force: NDArray[np.float64]) -> Quantization:
-    """Return what is found in the only drop of a record."""
+def quantized(force: np.ndarray) -> Quantization:
     return find_quantization(only_section(force, RATE))
 
 
-def offset(background: NDArray[np.float64]) -> float:
+def offset(background: np.ndarray) -> float:
     """Return the error of the offset of a background in whole steps of 1 N."""
     contact = np.rint(100 * np.sin(np.linspace(0, np.pi, 960)))
     force = np.concatenate([background, contact, background])
-    contact_span = (len(background), len(background) + 960)
-    return find_quantization(Section("", force, RATE, 0, contact_span)).offset
+    n = len(background)
+    return find_quantization(Section("", force, RATE, 0, (n, n + 960))).offset
 
 
 @pytest.mark.parametrize("step", [0.03, 1.0, 15.625, 156.25])
@@ -147,8 +142,8 @@ def test_effective_mass_has_the_quantization_of_the_impulse() -> None:
     recording = measured(force)
     (drop,), mass = recording.drops, recording.estimates["effective_mass"]
     impulse = drop.contact.background.quantization.offset * drop.contact_time.value
-    found = parts(mass.contributions)["quantization"]
-    assert found == pytest.approx(mass.value * impulse / drop.impulse.value)
+    expected = mass.value * impulse / drop.impulse.value
+    assert parts(mass.contributions)["quantization"] == pytest.approx(expected)
 
 
 def test_constant_background_next_to_a_steep_flank_is_not_lost() -> None:
@@ -185,14 +180,10 @@ def test_quantities_lie_in_their_intervals(bits: int, scale: float, noise: float
     inside = []
     for seed in range(20):
         recording = measured(record(step, max(noise * step, 0.05), seed))
-        errors = [
-            (abs(estimate.value - level), estimate.expanded)
-            for estimate, level in zip(recording.level_estimates(), LEVELS, strict=True)
-            if not estimate.upper_bound
-        ]
-        for name, value in (("contact_time", ABOVE), ("restitution", RESTITUTION)):
-            estimate = recording.estimates[name]
-            errors.append((abs(estimate.value - value), estimate.expanded))
+        known = [(recording.estimates["contact_time"], ABOVE),
+                 (recording.estimates["restitution"], RESTITUTION),
+                 *zip(recording.level_estimates(), LEVELS, strict=True)]  # fmt: skip
+        errors = [(abs(one.value - v), one.expanded) for one, v in known if not one.upper_bound]
         inside += [error <= expanded for error, expanded in errors]
         # None is far off.
         assert all(error <= 2.5 * expanded + 1e-3 for error, expanded in errors)
