@@ -95,7 +95,6 @@ def make_recording(  # noqa: PLR0913 - each is one fault
     noise_db: float = np.inf,
     colour: str = "white",
     offset: float = 0.0,
-    drift: float = 0.0,
     hum: tuple[float, float] = (50.0, 0.0),
     before: float = 0.1,
     after: float = 0.1,
@@ -124,14 +123,13 @@ def make_recording(  # noqa: PLR0913 - each is one fault
     clean = np.zeros(n)
     for start, factor in drops:
         clean += factor * np.interp(time - start, grid, force, left=0.0, right=0.0)
-    peak = float(np.max(force))
-    recording = clean + offset + drift * time
+    recording = clean + offset
     frequency, amplitude = hum
     for k, part in enumerate(HARMONICS, start=1):
         phase = rng.uniform(0, 2 * np.pi)
         recording += amplitude * part * np.sin(2 * np.pi * k * frequency * time + phase)
-    recording += coloured_noise(n, rate, peak * 10 ** (-noise_db / 20), colour, rng)
-    return recording, clean
+    deviation = float(np.max(force)) * 10 ** (-noise_db / 20)
+    return recording + coloured_noise(n, rate, deviation, colour, rng), clean
 
 
 # A half-sine of 1500 N and 20 ms, N, its rate, Hz, and the closed form of its levels, dB.
@@ -154,14 +152,9 @@ def half_sines(
 
 
 def make_drop(  # noqa: PLR0913 - what a recording may be
-    deviation: float = 0.0,
-    rate: float = 25600.0,
-    *,
-    before: float = 0.1,
-    after: float = 0.1,
-    seed: int = 0,
-    density: float | None = None,
-) -> Drop:
+    deviation: float = 0.0, rate: float = 25600.0, *, before: float = 0.1, after: float = 0.1,
+    seed: int = 0, density: float | None = None,
+) -> Drop:  # fmt: skip
     """Return a half-sine with white noise, known by its density, whose offset was removed."""
     time = (np.arange(round((before + 0.02 + after) * rate)) - round(before * rate)) / rate
     noise = np.random.default_rng(seed).normal(scale=deviation, size=len(time))

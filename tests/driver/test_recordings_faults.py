@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from conftest import REPOSITORY, codes, naming, noted, python
-from recording_files import WRITERS, half_sine
+from recording_files import noisy, recording_file
+from synthetic import recording_of
 
 import thud
 from thud.base.errors import InputError
-from thud.recordings.signal import Signal
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -26,31 +26,16 @@ from injection import can_inject, injecting
 
 @pytest.mark.skipif(not can_inject(), reason="there is no C compiler")
 def test_recording_is_read_where_the_file_system_has_no_locks(tmp_path: Path) -> None:
-    force = half_sine(44100)
-    WRITERS["plate.h5"](tmp_path / "plate.h5", force, 44100, "N")
+    recording_file(tmp_path / "plate.h5")
     read = "import thud; print(len(thud.read_recording('plate.h5').drops))"
     done = python("-c", read, cwd=tmp_path, env=injecting(no_locks=1))
     assert (done.stderr, done.stdout) == ("", "1\n")
 
 
-def drop_force(  # noqa: PLR0913 - each is one property of the force
-    rate: float,
-    *,
-    power: float = 1.3,
-    peak: float = 1500.0,
-    noise: float = 0.5,
-    skew: float = 0.0,
-    seed: int = 1,
-) -> np.ndarray:
+def drop_force(rate: float, power: float = 1.3, noise: float = 0.5) -> np.ndarray:
     """Return the force of a drop at 0.2 s with a contact of 18 ms, N, and white noise."""
-    time = np.arange(round(0.6 * rate)) / rate
-    phase = np.clip((time - 0.2) / 0.018, 0, 1)
-    pulse = np.sin(np.pi * phase) ** power * (1 + skew * np.cos(np.pi * phase))
-    return peak * pulse + np.random.default_rng(seed).normal(0, noise, len(time))
-
-
-def measured(force: np.ndarray, rate: float) -> thud.Recording:
-    return thud.read_recording(Signal.from_array(force, rate))
+    phase = np.clip((np.arange(round(0.6 * rate)) / rate - 0.2) / 0.018, 0, 1)
+    return noisy(1500 * np.sin(np.pi * phase) ** power, noise)
 
 
 @pytest.mark.parametrize("rate", [8e3, 51.2e3])
@@ -62,9 +47,8 @@ def test_spikes_in_a_contact_are_filled(rate: float, size: float, count: int, af
     force = whole.copy()
     first = round((0.2 + after) * rate)
     force[first : first + count] += size
-    found, expected = measured(force, rate), measured(whole, rate)
-    (drop,) = found.drops
-    spikes = noted(drop.notes, "spikes")
+    found, expected = recording_of(force, rate), recording_of(whole, rate)
+    spikes = noted(found.drops[0].notes, "spikes")
     assert (spikes.value, spikes.others["count"]) == (pytest.approx(1e3 * count / rate), 1)
     # A line over three samples at 8 kHz.
     np.testing.assert_allclose(found.levels(), expected.levels(), rtol=0, atol=0.05)
@@ -88,7 +72,7 @@ def faultless() -> Iterator[tuple[str, float, np.ndarray]]:
         yield "coarse steps", rate, np.round(drop_force(rate, noise=8.0) / 40.0) * 40.0
     for rate, noise in product((8e3, 51.2e3), (0.0, 0.3, 10.0)):
         phase = np.clip((np.arange(round(0.6 * rate)) / rate - 0.2) / 0.018, 0, 1)
-        white = np.random.default_rng(3).normal(0, noise, len(phase))
+        white = noisy(np.zeros(len(phase)), noise, 3)
         for power in (2, 4, 6):
             yield f"power {power}", rate, 1500 * (1 - np.abs(2 * phase - 1) ** power) + white
         for third in (0.0, 1 / 9, 0.25):
@@ -108,17 +92,15 @@ def faultless() -> Iterator[tuple[str, float, np.ndarray]]:
     ("rate", "force"),
     [pytest.param(*rest, id=f"{name}-{rest[0]:g}") for name, *rest in faultless()],
 )
-def test_forces_without_a_fault_are_neither_refused_nor_doubted(
-    rate: float, force: np.ndarray
-) -> None:
-    (drop,) = measured(force, rate).drops
+def test_forces_without_a_fault_are_not_doubted(rate: float, force: np.ndarray) -> None:
+    (drop,) = recording_of(force, rate).drops
     assert not {"spikes", "flat_top", "jump"} & {*codes(drop.notes)}
 
 
 @pytest.mark.parametrize("rate", [2.5e3, 8e3, 51.2e3])
 def test_step_of_a_force_is_a_jump_and_no_spike(rate: float) -> None:
     step = 30.0 * (np.arange(round(0.6 * rate)) > 0.2085 * rate)
-    (drop,) = measured(drop_force(rate) - step, rate).drops
+    (drop,) = recording_of(drop_force(rate) - step, rate).drops
     assert {"spikes", "jump"} & {*codes(drop.notes)} == {"jump"}
 
 
@@ -126,10 +108,8 @@ def test_force_of_finite_elements_has_no_jumps() -> None:
     rate = 51.2e3
     case = thud.read_case(REPOSITORY / "inputs/rubber_ball_fe.nml")
     impact = thud.solve(replace(case, sampling=thud.Sampling(rate, 0.03)))
-    clean = np.pad(impact.floor_force, 5000)
     for seed in range(3):
-        force = clean + np.random.default_rng(seed).normal(size=len(clean))
-        (drop,) = measured(force, rate).drops
+        (drop,) = recording_of(noisy(np.pad(impact.floor_force, 5000), 1, seed), rate).drops
         assert "jump" not in codes(drop.notes)
 
 
@@ -137,10 +117,9 @@ def test_force_of_finite_elements_has_no_jumps() -> None:
 @pytest.mark.parametrize("limit", [1450.0, 1200.0, 1000.0])
 @pytest.mark.parametrize("step", [0.0, 0.3])
 def test_force_that_an_amplifier_clips_is_named(rate: float, limit: float, step: float) -> None:
-    noise = np.random.default_rng(2).normal(0, 0.3, round(0.6 * rate))
-    force = np.minimum(drop_force(rate, noise=0.0), limit) + noise
+    force = noisy(np.minimum(drop_force(rate, noise=0.0), limit), 0.3, 2)
     force = np.round(force / step) * step if step else force
-    (drop,) = measured(force, rate).drops
+    (drop,) = recording_of(force, rate).drops
     assert noted(drop.notes, "flat_top").value == pytest.approx(limit, rel=0.01)
 
 
@@ -154,7 +133,7 @@ def test_lost_samples_are_named(step: float, after: float, value: float | None, 
     first = round((0.2 + after) * 48e3) - 20
     force[first : first + count] = force[first] if value is None else value
     if value is None and count == 6:  # it jumps by less than 4 % of the peak
-        assert measured(force, 48e3).drops
+        assert recording_of(force, 48e3).drops
         return
     with pytest.raises(InputError, match=naming(f"{count} samples", "leave_out")):
-        measured(force, 48e3)
+        recording_of(force, 48e3)

@@ -14,11 +14,11 @@ from synthetic import LEVELS, make_drop, parts, with_force
 import thud
 from thud.level.assessment import assess_levels
 from thud.level.estimate import Contribution, Estimate
+from thud.recordings import recorded_levels as module
 from thud.recordings.checks import outliers
 from thud.recordings.checks.outliers import find_outliers
 from thud.recordings.config import Config
 from thud.recordings.instruments import Plate, instrument_uncertainties
-from thud.recordings import recorded_levels as module
 from thud.recordings.recorded_levels import DropLevels, average_levels, measure_levels
 
 NOMINAL = [39.0, 31.0, 23.0, 17.0, 12.5]
