@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from conftest import codes, noted
+from recording_files import noisy
 from scipy import stats
 from scipy.integrate import quad
 from synthetic import coloured_noise, make_drop, noise_density
@@ -30,18 +31,17 @@ SLOPE = np.array([0.5, 0.25, 1.0, 0.25, 0.25])
 PEAK = 1500.0
 
 
-def cells_of(edges: list[float]) -> Cells:
-    return np.array(edges[:-1]), np.array(edges[1:])
+def cells_of(edges: np.ndarray) -> Cells:
+    return edges[:-1], edges[1:]
+
+
+def joined(one: Cells, other: Cells) -> Cells:
+    return np.append(one[0], other[0]), np.append(one[1], other[1])
 
 
 QUIET_EDGES = -0.012 - np.cumsum([0, 5e-4, 5e-4, 1e-3, 2e-3, 2e-3, 3e-3, 3e-3])[::-1]
-QUIET: Cells = tuple(  # type: ignore[assignment]
-    np.concatenate([one, other])
-    for one, other in zip(
-        cells_of(QUIET_EDGES.tolist()), cells_of((-0.7 * QUIET_EDGES[::-1]).tolist()), strict=True
-    )
-)
-CONTACT = cells_of(np.linspace(-0.0115, 0.008, 6).tolist())
+QUIET = joined(cells_of(QUIET_EDGES), cells_of(-0.7 * QUIET_EDGES[::-1]))
+CONTACT = cells_of(np.linspace(-0.0115, 0.008, 6))
 VARIANCES = np.array([[0.02, 3.0, 40.0, 2.0, 8.0], [0.03, 1.0, 90.0, 0.5, 8.0], [0.01, 9, 5, 3, 1]])
 
 
@@ -57,9 +57,8 @@ def test_noise_between_two_frequencies_is_the_integral_of_its_spectrum() -> None
     assert noise.deviation_between(3, 700) == pytest.approx(np.sqrt(power))
 
 
-def mean_of_lags(one: tuple[float, float], other: tuple[float, float], brown: bool) -> float:  # noqa: FBT001
+def mean_of_lags(a: float, b: float, c: float, d: float, brown: bool) -> float:  # noqa: FBT001
     """Return the mean of the covariance at a lag over two cells, by the density of their lags."""
-    (a, b), (c, d) = one, other
 
     def integrand(lag: float) -> float:
         overlap = max(min(b, d + lag) - max(a, c + lag), 0.0)
@@ -74,11 +73,10 @@ def mean_of_lags(one: tuple[float, float], other: tuple[float, float], brown: bo
 def test_covariances_are_means_over_cells(brown: bool) -> None:  # noqa: FBT001
     begins = np.array([0.0, 1e-3, 2e-3, 5e-3, 9e-3, 0.1])
     ends = np.array([1e-3, 2e-3, 4e-3, 6e-3, 12e-3, 0.103])
-    cells = begins, ends
-    found = unit_covariances(cells, cells)[int(brown)]
+    found = unit_covariances((begins, ends), (begins, ends))[int(brown)]
     for i, k in product(range(6), range(6)):
-        one, other = ((begins[j], ends[j]) for j in (i, k))
-        assert found[i, k] == pytest.approx(mean_of_lags(one, other, brown), rel=1e-7)
+        expected = mean_of_lags(begins[i], ends[i], begins[k], ends[k], brown)
+        assert found[i, k] == pytest.approx(expected, rel=1e-7)
 
 
 def test_hum_has_harmonics_of_random_phases_and_an_uncertain_frequency() -> None:
@@ -100,9 +98,9 @@ def test_hum_has_harmonics_of_random_phases_and_an_uncertain_frequency() -> None
 
 def dense(variances: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return covariances of quiet, quiet and contact, and contact for some variances."""
-    both = tuple(np.concatenate(pair) for pair in zip(QUIET, CONTACT, strict=True))
-    time = middle(both)  # type: ignore[arg-type]
-    whole = np.tensordot(variances[1:], unit_covariances(both, both)[:4], 1)  # type: ignore[arg-type]
+    both = joined(QUIET, CONTACT)
+    time = middle(both)
+    whole = np.tensordot(variances[1:], unit_covariances(both, both)[:4], 1)
     whole += PEAK**2 * (OFFSET**2 + DRIFT**2 * np.multiply.outer(time, time))
     n = len(QUIET[0])
     quiet = whole[:n, :n] + variances[0] / 2 * np.diag(1 / (QUIET[1] - QUIET[0]))
@@ -113,8 +111,7 @@ def dense(variances: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def background() -> Background:
     """Return a background of means that hold an offset, a drift and hum."""
     time = middle(QUIET)
-    noise = np.random.default_rng(2).normal(size=len(time))
-    mean = 20 + 300 * time + 3 * np.sin(2 * np.pi * 60 * time) + noise
+    mean = noisy(20 + 300 * time + 3 * np.sin(2 * np.pi * 60 * time), 1, 2)
     return Background(QUIET, mean, VARIANCES[0], PEAK)
 
 
@@ -131,8 +128,8 @@ def test_prediction_is_the_normal_distribution_given_the_quiet(background: Backg
 def test_step_at_an_unknown_instant_is_a_line_with_the_error_of_its_instant() -> None:
     """Offsets before and after that are known: the step to an instant is uniformly distributed."""
     ends, step = (QUIET[1][QUIET[1] < 0].max(), QUIET[0][QUIET[0] > 0].min()), 40.0
-    mean, few = np.where(middle(QUIET) > 0, step, 0.0), np.array([1e-9, 1e-9, 1e-9, 1e-9, 1e-9])
-    found = Background(QUIET, mean, few, PEAK, ends=ends, step=step)
+    mean = np.where(middle(QUIET) > 0, step, 0.0)
+    found = Background(QUIET, mean, np.full(5, 1e-9), PEAK, ends=ends, step=step)
     passed = (middle(CONTACT) - ends[0]) / (ends[1] - ends[0])
     np.testing.assert_allclose(found.predict(CONTACT), step * passed, atol=0.01 * step)
     instants = ends[0] + (ends[1] - ends[0]) * (np.arange(20_000) + 0.5) / 20_000
@@ -191,17 +188,15 @@ def test_posterior_is_likelihood_times_priors(background: Background) -> None:
 def test_derivatives_of_the_posterior(background: Background) -> None:
     phi, step = np.log(VARIANCES[1]), 1e-4
     _, score, curvature = log_posterior(background, phi, 10.0)
-    ends = [
-        [log_posterior(background, phi + side * change, 10.0)[0] for side in (-1, 1)]
-        for change in step * np.eye(5)
-    ]
-    slopes = np.diff(ends)[:, 0] / (2 * step)
-    np.testing.assert_allclose(score, slopes, rtol=1e-4, atol=1e-5)
+    high, low = (
+        np.array([log_posterior(background, phi + change, 10.0)[0] for change in side * np.eye(5)])
+        for side in (step, -step)
+    )
+    np.testing.assert_allclose(score, (high - low) / (2 * step), rtol=1e-4, atol=1e-5)
     # Average information of the likelihood (Gilmour, Thompson and Cullis 1995), and the priors'.
     inverse = np.linalg.inv(dense(VARIANCES[1])[0])
-    turned = [theta * part @ inverse @ background.mean for theta, part in zip(
-        VARIANCES[1], units_of_quiet(), strict=True)]  # fmt: skip
-    expected = 0.5 * np.array(turned) @ inverse @ np.transpose(turned) + np.diag(SLOPE)
+    turned = VARIANCES[1][:, None] * (units_of_quiet() @ inverse @ background.mean)
+    expected = 0.5 * turned @ inverse @ turned.T + np.diag(SLOPE)
     np.testing.assert_allclose(curvature, expected, rtol=1e-4)
 
 
@@ -219,14 +214,12 @@ def test_variances_are_a_maximum_without_slope(background: Background) -> None:
 def test_fitted_density_is_that_of_the_noise(colour: str) -> None:
     rate, order = 8000.0, ["white", "pink", "brown"].index(colour)
     edges = np.arange(0, 801, 8)
-    sides = [cells_of(list(side)) for side in (0.01 + edges / rate, -0.01 - edges[::-1] / rate)]
-    quiet: Cells = tuple(np.concatenate(pair) for pair in zip(*sides, strict=True))  # type: ignore[assignment]
+    quiet = joined(cells_of(0.01 + edges / rate), cells_of(-0.01 - edges[::-1] / rate))
     ratios = []
     for seed in range(8):
         noise = coloured_noise(1900, rate, 5.0, colour, np.random.default_rng(seed))
         means = [np.add.reduceat(noise[i : i + 800], edges[:-1]) / 8 for i in (960, 0)]
-        cell_means = np.concatenate(means)
-        likely, covariance = fit_noise(quiet, cell_means, PEAK)
+        likely, covariance = fit_noise(quiet, np.concatenate(means), PEAK)
         variances = np.exp(likely + np.diagonal(covariance) / 2)
         frequency = {"white": 400.0, "pink": 60.0, "brown": 20.0}[colour]
         density = variances[:3] * frequency ** -np.arange(3.0)
@@ -248,9 +241,8 @@ def test_functionals_have_the_energy_of_a_band(rate: float, bands: BandSet) -> N
         np.sum((band_functionals(len(force), rate, *edge) @ force) ** 2)
         for edge in zip(edges.lower, edges.upper, strict=True)
     ]
-    np.testing.assert_allclose(
-        10 * np.log10(energies), thud.force_exposure_levels(force, rate, bands), atol=1e-6
-    )
+    levels = thud.force_exposure_levels(force, rate, bands)
+    np.testing.assert_allclose(10 * np.log10(energies), levels, atol=1e-6)
 
 
 def test_energy_of_the_noise_follows_its_formula() -> None:
