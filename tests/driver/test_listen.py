@@ -11,6 +11,7 @@ import pyoctaveband
 import pytest
 import soundfile
 from conftest import MINIMAL
+from refusals.core import write
 from scipy.signal import resample
 
 import thud
@@ -52,14 +53,20 @@ def fast_history(pressure: Array) -> Array:
 def library_histories(pressure: Array, fraction: int) -> Array:
     """Return the Fast histories, Pa2, of octaves 63 to 500 Hz or thirds 50 to 630 Hz."""
     limits = {1: [60, 600], 3: [48, 660]}[fraction]
-    bands = pyoctaveband.octavefilter(
-        pressure, RATE, fraction=fraction, limits=limits, sigbands=True
-    )[2]
+    how = {"fraction": fraction, "limits": limits, "sigbands": True}
+    bands = pyoctaveband.octavefilter(pressure, RATE, **how)[2]
     return np.array([fast_history(band) for band in bands[-4 * fraction :]])
 
 
 def octave_sums(thirds: Array) -> Array:
     return np.asarray(thirds.reshape(4, 3, -1).sum(axis=1))
+
+
+def pressure_in(sound: thud.RoomSound) -> Array:
+    """Return the pressure that the file of a sound holds, Pa."""
+    samples, rate = soundfile.read(io.BytesIO(sound.wav()))
+    assert rate == RATE
+    return np.asarray(samples * sound.full_scale)
 
 
 @pytest.fixture(scope="module")
@@ -80,9 +87,7 @@ def test_levels_by_another_instrument_are_those_predicted(
     """Octaves and A-weighted level of the file by PyOctaveBand, within 0.5 dB."""
     prediction = predictions[name]
     sound = thud.listen({name: prediction}, seed=seed)
-    samples, rate = soundfile.read(io.BytesIO(sound.wav()))
-    assert rate == RATE
-    pressure = samples * sound.full_scale
+    pressure = pressure_in(sound)
     # What the bands should be: the modal pressure by the library, and the statistical histories.
     (only,) = sound.sounds
     n = prediction.n_modal
@@ -102,19 +107,15 @@ def test_levels_by_another_instrument_are_those_predicted(
         bands[k] *= 4e-10 * 10 ** (prediction.level[k] / 10) / bands[k].max()
     octaves = level(octave_sums(bands))
     errors = level(octave_sums(library_histories(pressure, 3))) - octaves
-    oracle(
-        "octaves of the sound below a floor, by PyOctaveBand",
-        "independent code", errors, 0.5, "dB",
-    )  # fmt: skip
+    what = "octaves of the sound below a floor, by PyOctaveBand"
+    oracle(what, "independent code", errors, 0.5, "dB")
     # Filters of octaves also let through some of a louder octave beside theirs.
     above = level(library_histories(pressure, 1)) - octaves
     assert (above > -0.5).all()
     assert (above < 1.6).all()
     fast = fast_history(pyoctaveband.WeightingFilter(RATE, "A").filter(pressure))
-    oracle(
-        "maximum A-weighted Fast level of the sound below a floor, by PyOctaveBand",
-        "independent code", level(fast) - level(a_weighting(CENTER) @ bands), 0.5, "dB",
-    )  # fmt: skip
+    what = "maximum A-weighted Fast level of the sound below a floor, by PyOctaveBand"
+    oracle(what, "independent code", level(fast) - level(a_weighting(CENTER) @ bands), 0.5, "dB")
     # Class 1 filters of thud and of the library differ by their skirts, beside loud bands.
     assert only.reference.third[:n] == pytest.approx(room.level[i, j], abs=0.05)
     assert only.reference.third[n:] == pytest.approx(prediction.level[n:], abs=0.01)
@@ -157,19 +158,16 @@ def test_floors_follow_each_other_at_one_scale(
 
 
 def test_file_states_scale_contents_and_limits(found: thud.RoomSound, tmp_path: Path) -> None:
-    path = tmp_path / "sound.wav"
-    found.save(path)
-    with soundfile.SoundFile(path) as file:
+    found.save(tmp_path / "sound.wav")
+    with soundfile.SoundFile(tmp_path / "sound.wav") as file:
         assert (file.subtype, file.channels, file.samplerate) == ("PCM_24", 1, RATE)
-        samples = file.read()
-        comment = file.comment
+        pressure = file.read() * found.full_scale
         assert file.software.startswith(f"thud {thud.__version__}")
-    assert samples * found.full_scale == pytest.approx(
-        found.pressure, abs=1.01 * found.full_scale / 2**23
-    )
-    assert comment == found.comment
+        assert file.comment == found.comment
+    assert pressure == pytest.approx(found.pressure, abs=1.01 * found.full_scale / 2**23)
     second = f"{found.starts[1]:.3f} s joists"
-    assert all(s in comment for s in (f"{found.full_scale:g} Pa", "0.000 s concrete", second))
+    for stated in (f"{found.full_scale:g} Pa", "0.000 s concrete", second):
+        assert stated in found.comment
 
 
 def test_position_is_chosen(predictions: dict[str, thud.RoomPrediction]) -> None:
@@ -211,15 +209,13 @@ def test_stated_level_of_a_steep_spectrum_is_that_of_its_own_file(
     A-weighting at mid frequencies missed the level of modes at the edges of bands by 5 dB.
     """
     sound = thud.listen(thud.predict_level(floor=name, room=ROOM))
-    samples, rate = soundfile.read(io.BytesIO(sound.wav()))
-    spectrum = np.fft.rfft(samples * sound.full_scale, 2 * len(samples))
-    weight = np.sqrt(a_weighting(np.fft.rfftfreq(2 * len(samples), 1 / rate)))
-    fast = fast_history(np.fft.irfft(spectrum * weight)[: len(samples)])
+    pressure = pressure_in(sound)
+    n = len(pressure)
+    weight = np.sqrt(a_weighting(np.fft.rfftfreq(2 * n, 1 / RATE)))
+    fast = fast_history(np.fft.irfft(np.fft.rfft(pressure, 2 * n) * weight)[:n])
     (only,) = sound.sounds
-    oracle(
-        "stated A-weighted level of a sound with modes below 50 Hz",
-        "closed form", level(fast) - only.level.a_weighted, 0.02, "dB",
-    )  # fmt: skip
+    what = "stated A-weighted level of a sound with modes below 50 Hz"
+    oracle(what, "closed form", level(fast) - only.level.a_weighted, 0.02, "dB")
     assert only.level.deviation(only.reference) < 0.5
 
 
@@ -232,25 +228,19 @@ def test_bands_that_cannot_be_reached_are_said(found: thud.RoomSound) -> None:
     assert not any(note.code == "sound_deviates" for note in found.notes)
 
 
-def test_command_writes_a_file_and_says_what_it_is(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    paths = []
+@pytest.mark.usefixtures("working_directory")
+def test_command_writes_a_file_and_says_what_it_is(capsys: pytest.CaptureFixture[str]) -> None:
     for name, floor in (("slab", "plate"), ("joists", "joist_floor")):
-        paths.append(str(tmp_path / f"{name}.nml"))
-        (tmp_path / f"{name}.nml").write_text(
-            f"{MINIMAL}&floor name = '{floor}' / &room volume = 40 /"
-        )
-    target = str(tmp_path / "ab.wav")
-    assert main(["listen", *paths, "-o", target, "--pause", "0.5", "--position", "1", "2"]) == 0
+        write(f"{name}.nml", f"{MINIMAL}&floor name = '{floor}' / &room volume = 40 /")
+    words = "listen slab.nml joists.nml -o ab.wav --pause 0.5 --position 1 2"
+    assert main(words.split()) == 0
     shown = capsys.readouterr().out
     assert all(text in shown for text in ("slab", "joists", "0.00", "1, 2"))
     assert shown.count("not recorded") == 1
-    assert soundfile.info(target).samplerate == RATE
+    assert soundfile.info("ab.wav").samplerate == RATE
 
 
 def test_samples_next_to_full_scale_keep_their_sign() -> None:
     samples = np.array([1.0, 0.99999999, 1 - 2.0**-24, 1 - 2.0**-23, -1.0, -0.99999999])
-    content = wav_file(samples, RATE, "comment", "PCM_24")
-    read, _ = soundfile.read(io.BytesIO(content))
+    read, _ = soundfile.read(io.BytesIO(wav_file(samples, RATE, "comment", "PCM_24")))
     np.testing.assert_allclose(read, samples, rtol=0, atol=2.0**-23)

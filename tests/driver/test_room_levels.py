@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +21,6 @@ from thud.level.rating import CLASS_LIMITS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
 PUBLISHED = REPOSITORY / "inputs" / "floors" / "field_levels.csv"
 # A survey that raises no warning.
@@ -40,10 +40,8 @@ def test_published_measurement_is_standardized_and_rated(
     found = thud.read_room_levels(PUBLISHED, volume=41.4)
     printed = [76.3, 57.2, 47.2, 44.8, 38.1, 37.0, 35.3, 30.7, 24.5, 22.2, 16.8, 15.1]
     # Printed to 0.1 dB; its own rounding of the table of g(C) leaves 0.07 dB.
-    oracle(
-        "standardized levels of a room (Gurtner)", "published measurement",
-        found.standardized - printed, 0.1, "dB",
-    )  # fmt: skip
+    what = "standardized levels of a room (Gurtner)"
+    oracle(what, "published measurement", found.standardized - printed, 0.1, "dB")
     assert found.rating.a_weighted == pytest.approx(46.97, abs=0.01)
     assert found.standardized_rating.a_weighted == pytest.approx(46.24, abs=0.01)
     assert (found.rating.rounded, found.standardized_rating.rounded) == (47, 46)
@@ -53,17 +51,13 @@ def test_published_measurement_is_standardized_and_rated(
     assert "47 (46.97)" in shown.out
     assert "46 (46.24)" in shown.out
     assert "background" in shown.err
-    assert names_in(write("out/thud.txt", "").parent) == [
-        "room_levels.csv", "room_levels.svg", "thud.txt",
-    ]  # fmt: skip
+    assert names_in(Path("out")) == ["room_levels.csv", "room_levels.svg", "thud.txt"]
 
 
 def test_example_of_iso_717_2_is_rated(oracle: Callable[..., None]) -> None:
     found = thud.rating([65.3, 64.5, 58.0, 55.8])
-    oracle(
-        "rating of the example of ISO 717-2", "published example",
-        found.a_weighted - 55.3507, 1e-4, "dB",
-    )  # fmt: skip
+    what = "rating of the example of ISO 717-2"
+    oracle(what, "published example", found.a_weighted - 55.3507, 1e-4, "dB")
     assert (found.rounded, found.curve, found.korean_class) == (55, 51, 0)
 
 
@@ -82,10 +76,9 @@ def test_example_of_iso_717_2_is_rated(oracle: Callable[..., None]) -> None:
 )
 def test_levels_are_read_in_their_units(titles: str, cells: tuple[str, ...]) -> None:
     levels = [70.5, 60.0, 50.0, 40.5]
-    rows = [
-        cells[min(i, len(cells) - 1)].format(f=f, k=f / 1000, v=v)
-        for i, (f, v) in enumerate(zip(OCTAVES, levels, strict=True))
-    ]
+    forms = cells if len(cells) > 1 else cells * 4
+    bands = zip(forms, OCTAVES, levels, strict=True)
+    rows = [form.format(f=f, k=f / 1000, v=v) for form, f, v in bands]
     found = room_levels("\n".join([titles, *rows]))
     assert found.positions.tolist() == [levels]
     time = found.reverberation_time
@@ -121,9 +114,8 @@ def test_tables_of_any_language_and_order_are_read(
     table = np.column_stack([bands, *rng.uniform(-50, 200, (3, 7)), rng.uniform(0.01, 100, 7)])
     # Values at their bounds.
     table[:2, 1], table[:2, 4] = (-50, 200), (0.01, 100)
-    rows = [
-        [f"{cell:.8g}".replace(".", ",") for cell in row] for row in table * [shift, 1, 1, 1, 1]
-    ]
+    table[:, 0] *= shift
+    rows = [[f"{cell:.8g}".replace(".", ",") for cell in row] for row in table]
     lines = [";".join(row[i] for i in columns) for row in (titles[0].split(";"), *rows)]
     file = write("levels.csv", "\r\n".join(lines).encode(titles[1]))
     found = thud.read_room_levels(file, volume=40.0)
@@ -133,8 +125,7 @@ def test_tables_of_any_language_and_order_are_read(
     assert found.background == pytest.approx(expected[3])
     assert found.reverberation_time == pytest.approx(expected[4])
     assert found.rating.rows() == thud.rating(found.level[2:6]).rows()
-    rows = thud.rating(found.standardized[2:6]).rows()
-    assert found.standardized_rating.rows() == rows
+    assert found.standardized_rating.rows() == thud.rating(found.standardized[2:6]).rows()
 
 
 def test_mean_background_and_scatter_of_positions() -> None:
@@ -144,16 +135,11 @@ def test_mean_background_and_scatter_of_positions() -> None:
     mean = (10 ** (levels / 10)).mean(axis=0)
     assert found.measured == pytest.approx(10 * np.log10(mean))
     near = found.measured - background
-    expected = np.where(
-        near >= 15, 10 * np.log10(mean),
-        found.measured + 10 * np.log10(1 - 10 ** (-np.maximum(near, 6) / 10)),
-    )  # fmt: skip
-    assert found.level == pytest.approx(expected)
+    corrected = found.measured + 10 * np.log10(1 - 10 ** (-np.maximum(near, 6) / 10))
+    assert found.level == pytest.approx(np.where(near >= 15, found.measured, corrected))
     assert found.is_upper_bound.tolist() == (near < 6).tolist()
     assert found.is_upper_bound.any()
-    assert found.spread == pytest.approx(
-        np.sqrt(((levels - levels.mean(axis=0)) ** 2).sum(axis=0) / 5)
-    )
+    assert found.spread == pytest.approx(levels.std(axis=0, ddof=1))
     # The A-weighted energy of each position, and the standard error of their mean.
     energy = np.array([10 ** (thud.rating(one).a_weighted / 10) for one in levels])
     error = energy.std(ddof=1) / np.sqrt(6) / energy.mean() * 10 / np.log(10)
@@ -237,17 +223,16 @@ def test_tables_hold_the_numbers_of_the_survey() -> None:
     assert rating_table(replace(NEAR, volume=None)) == alone
 
 
-def test_workbook_is_read_like_a_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_workbook_is_read_like_a_table(monkeypatch: pytest.MonkeyPatch) -> None:
     openpyxl = pytest.importorskip("openpyxl")
     book = openpyxl.Workbook()
     book.active.append(["Messung vom 3. Mai"])
     sheet = book.create_sheet("Pegel")
-    sheet.append(["Bericht"])
-    sheet.append([])
-    sheet.append([None, "Frequenz (Hz)", "P1", "P2", None, "Nachhallzeit"])
-    for f, level in zip(OCTAVES, (70.5, 60, 55, 50), strict=True):
-        sheet.append([None, f, level, level + 2, None, 0.6])
-    path = tmp_path / "levels.xlsx"
+    titles = [None, "Frequenz (Hz)", "P1", "P2", None, "Nachhallzeit"]
+    bands = zip(OCTAVES, (70.5, 60, 55, 50), strict=True)
+    for row in (["Bericht"], [], titles, *([None, f, v, v + 2, None, 0.6] for f, v in bands)):
+        sheet.append(row)
+    path = "levels.xlsx"
     book.save(path)
     found = thud.read_room_levels(path)
     assert found.positions.tolist() == [[70.5, 60, 55, 50], [72.5, 62, 57, 52]]
