@@ -54,11 +54,10 @@ RESULT_FILES = ["effective.nml", "force.csv", "levels.csv", "summary.nml", "thud
 NAMING = r"(?is)\A"
 
 
-def recorded(impact: thud.Impact, **known: float) -> thud.Recording:
-    """Return what a force plate with little noise records of an impact."""
-    quiet = int(0.1 * impact.sample_rate)
-    force = np.pad(impact.floor_force, quiet)
-    force += np.random.default_rng(1).normal(scale=0.5, size=len(force))
+def recorded(impact: thud.Impact, noise: float = 0.5, **known: float) -> thud.Recording:
+    """Return what a force plate with white noise, N, records of an impact."""
+    force = np.pad(impact.floor_force, int(0.1 * impact.sample_rate))
+    force += np.random.default_rng(1).normal(scale=noise, size=len(force))
     return thud.read_recording(Signal.from_array(force, impact.sample_rate), config=Config(**known))
 
 

@@ -7,10 +7,9 @@ import json
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import pytest
-from conftest import REPOSITORY, names_in
-from synthetic import recording_of
+from conftest import REPOSITORY, names_in, recorded
+from refusals.core import write
 
 from thud import cli
 from thud.base.files import Results
@@ -28,9 +27,7 @@ FILES = ["criteria.csv", "levels.csv", "report.json", "thud.txt"]
 @pytest.fixture(scope="module")
 def noisy(shell: thud.Impact) -> ReportData:
     """Return the report of a recording whose level at 500 Hz lies in the background."""
-    force = np.pad(shell.floor_force, int(0.1 * shell.sample_rate))
-    force += np.random.default_rng(1).normal(scale=100, size=len(force))
-    recording = recording_of(force, shell.sample_rate, height=1.0, mass=2.5)
+    recording = recorded(shell, 100, height=1.0, mass=2.5)
     assert recording.average().flag[-1] == "background"
     return report_data(replace(recording, calibration_uncertainty=0.01))
 
@@ -96,9 +93,9 @@ def test_page_that_fails_leaves_the_earlier_results(
 
 @pytest.mark.usefixtures("working_directory")
 def test_screen_lists_what_the_report_misses(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (tmp_path / "lab.toml").write_text('[report]\nnumber = "1"\nclient = "Client"\n')
+    write("lab.toml", '[report]\nnumber = "1"\nclient = "Client"\n')
     monkeypatch.setattr(recording_files, "draw_figures", lambda _: None)
     drop = REPOSITORY / "inputs/recordings/drop_1.csv"
     for options, count in (([], 1), (["--no-figures"], 0)):

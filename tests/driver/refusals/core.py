@@ -22,7 +22,7 @@ __all__ = ["MINIMAL", "Results", "inf", "nan", "np", "peak_count"]
 PULSE = np.sin(np.pi * np.linspace(0, 1, 883))
 
 
-def write(name: str, text: str | bytes) -> Path:
+def write(name: str | Path, text: str | bytes) -> Path:
     """Write a file in the directory of the test; return its path."""
     path = Path(name)
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
