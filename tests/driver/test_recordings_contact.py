@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from recording_files import noisy
 from scipy import stats
 from scipy.ndimage import median_filter, uniform_filter1d
 from synthetic import half_sine, make_drop, only_section
@@ -79,14 +80,11 @@ def test_peak_is_less_what_noise_adds_and_as_uncertain() -> None:
 
 
 @pytest.mark.parametrize(("size", "rate"), [(0.05, 25600.0), (12.0, 25600.0), (30.0, 5000.0)])
-def test_content_that_folds_back_falls_with_the_square_of_the_frequency(
-    size: float, rate: float
-) -> None:
+def test_content_that_folds_back_falls_with_frequency_squared(size: float, rate: float) -> None:
     """A density of a (0.45 rate/f)**2 beyond half the rate, folded to the edge of the octave."""
     one = make_drop(0.0, rate).contact
-    time = np.arange(len(one.force)) / rate
-    force = one.force + size * np.cos(2 * np.pi * 0.45 * rate * time)
-    one = replace(one, force=force)
+    tone = size * np.cos(2 * np.pi * 0.45 * np.arange(len(one.force)))
+    one = replace(one, force=one.force + tone)
     count = len(one.gated)
     length = count + int(rate / 20) + 3 * count
     f = np.fft.rfftfreq(length, 1 / rate)
@@ -103,8 +101,8 @@ def test_content_that_folds_back_falls_with_the_square_of_the_frequency(
     white = top**2 * ((rate - 707.9) / 0.45 / rate) ** 4 / count / rate * 2
     for factor, expected in ((0.1, bool(told)), (0.34, False)):
         variances = np.array([factor * white, 0, 0, 0, 0])
-        noisy = replace(one, background=replace(one.background, variances=variances))
-        assert bool(check_aliasing(section, noisy)) == expected
+        loud = replace(one, background=replace(one.background, variances=variances))
+        assert bool(check_aliasing(section, loud)) == expected
 
 
 def test_shapes_are_those_of_the_theory() -> None:
@@ -132,8 +130,7 @@ def edge_errors(
     """
     record, start = np.zeros(int(0.25 * rate)), int(0.1 * rate)
     record[start:][: len(pulse[::factor])] += pulse[::factor]
-    record += noise * np.random.default_rng(seed).normal(size=len(record))
-    found, first = found_contact(record, rate)
+    found, first = found_contact(noisy(record, noise, seed), rate)
     true = np.array(contact_span(pulse, factor * rate)) + start / rate - first
     edges = found.begin, found.end
     return [(e.value - t, e.uncertainty) for e, t in zip(edges, true, strict=True)]
@@ -142,7 +139,7 @@ def edge_errors(
 @pytest.mark.parametrize(
     ("power", "jump", "steep"), [(1.0, 0, 0), (1.5, 0, 0), (2, 0, 0), (1, 0.1, 0), (1, 0, 12)]
 )
-def test_edges_of_flanks_are_where_their_force_passes_a_percent(
+def test_edges_of_flanks_lie_at_a_percent_of_the_peak(
     power: float, jump: float, steep: float
 ) -> None:
     """Lines, points of contact, feet, jumps, and rises to half the peak within a millisecond."""
@@ -164,7 +161,7 @@ def test_uncertainty_of_edges_is_the_scatter() -> None:
 
 @pytest.mark.parametrize("rate", [8000.0, 51200.0])
 @pytest.mark.parametrize(("power", "decay"), [(1.0, 1.4), (1.3, 1.4), (1.3, 0.6)])
-def test_slow_release_ends_where_its_force_passes_a_percent(
+def test_slow_release_ends_at_a_percent_of_the_peak(
     power: float, decay: float, rate: float
 ) -> None:
     """From a fifth of the peak to 1 % the force falls in 4.4 to 6.6 ms."""
@@ -210,9 +207,8 @@ def test_peak_of_a_pulse_is_above_the_higher_background_beside_it(ahead: str) ->
     ("valley", "after", "expected"), [(0.1, 0.0, 2), (0.4, 0.0, 1), (1.0, 0.2, 1), (1.0, 0.5, 0)]
 )
 def test_pulses_return_to_thirty_percent(valley: float, after: float, expected: int) -> None:
-    cells = np.zeros(1000)
     instants, forces = [500, 510, 514, 518, 522, 532], [0, 1, valley, valley, 1, after]
-    cells += 1000 * np.interp(np.arange(1000), instants, forces)
+    cells = 1000 * np.interp(np.arange(1000), instants, forces)
     assert len(drops._find_pulses(cells, 0, 1000, 1000.0)) == expected  # noqa: SLF001
 
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import scipy.signal
 from conftest import codes
-from synthetic import felt, recording_of
+from recording_files import noisy
+from synthetic import felt, half_sine, recording_of
 
 from thud.recordings.instruments import Plate, RecorderFilter
 
@@ -24,6 +25,8 @@ STATED: dict[str, Any] = {
     "mass_uncertainty": 0.002, "height_uncertainty": 0.002, "calibration_uncertainty": 0.002,
 }  # fmt: skip
 AFTER = TIME > 0
+# Resonances and qualities.
+RINGS = (400, 25), (400, 100), (1100, 100)
 # Hum of less, N, may be noted where something else is slow.
 SMALL = 0.5
 # A limit of the errors of levels, dB: their intervals, and none.
@@ -89,9 +92,7 @@ def held() -> np.ndarray:
     return force - PULSE - NOISE
 
 
-def row(
-    name: str, disturbance: np.ndarray, notes: list[dict[str, Any]], limit: float = INTERVAL
-) -> Any:  # noqa: ANN401
+def row(name: str, disturbance: np.ndarray, notes: Any, limit: float = INTERVAL) -> Any:  # noqa: ANN401
     """Return a disturbance, N, the notes on it, and the limit of the errors of the levels."""
     return pytest.param(disturbance, notes, limit, id=name)
 
@@ -114,22 +115,15 @@ def truth() -> thud.Recording:
         row("small tone", wave(550.3, 1), [tone(550.3, 1)], 0.03),
         # In the quiet before the contact too, it is no ringing.
         row("high tone", wave(1100, 10), [tone(1100, 10)], 0.03),
-        row(
-            "three tones",
-            wave(350, 3) + wave(450, 2) + wave(911.7, 1),
-            [tone(350, 3), tone(450, 2), tone(911.7, 1)],
-            0.03,
-        ),
+        row("three tones", wave(350, 3) + wave(450, 2) + wave(911.7, 1),
+            [tone(350, 3), tone(450, 2), tone(911.7, 1)], 0.03),
         rings("tone that begins", wave(450, 3) * AFTER, 450, 1414),
         row("tone that falls", wave(450, 3) * np.where(AFTER, 0.5, 1.0), [], NONE),
         row("tone that turns", wave(450, 3) * np.where(AFTER, -1.0, 1.0), [], NONE),
         # Beyond the recorded band, where they move the edges of the contact.
         *(row(f"tone of {f}", wave(f, 20), [], NONE) for f in (5600, 6400, 11600)),
         row("narrow noise", narrow(), []),
-        *(
-            rings(f"ringing {f} {q}", ringing(f, q), f, q)
-            for f, q in ((400, 25), (400, 100), (1100, 100))
-        ),
+        *(rings(f"ring {f} {q}", ringing(f, q), f, q) for f, q in RINGS),
         plate(1100, 25),
         plate(1300, 10),
         plate(1600, 40),
@@ -140,7 +134,7 @@ def truth() -> thud.Recording:
         row("constant before", -NOISE * (TIME < -0.15), [{"code": "constant_background"}]),
         row("held samples beside a tone", held(), [{"code": "jump"}, tone(450, 3)], NONE),
     ],
-)
+)  # fmt: skip
 def test_disturbance_is_noted_and_in_the_interval(
     disturbance: np.ndarray, notes: list[dict[str, Any]], limit: float, truth: thud.Recording
 ) -> None:
@@ -170,7 +164,5 @@ def test_step_of_the_offset_widens_what_is_measured(truth: thud.Recording) -> No
 
 def test_quiet_next_to_little_noise_at_a_frequency_is_no_tone() -> None:
     # The noise at 306 Hz is below that around it.
-    draws = np.random.default_rng(81).normal(0, 0.3, 30720)
-    time = np.arange(len(draws)) / 51.2e3
-    pulse = 1500 * np.sin(np.pi * np.clip((time - 0.2) / 0.018, 0, 1))
-    assert "tone_removed" not in codes(recording_of(pulse + draws, 51.2e3).notes)
+    force = noisy(half_sine(51.2e3, 0.2, 30720, duration=0.018), 0.3, 81)
+    assert "tone_removed" not in codes(recording_of(force, 51.2e3).notes)
