@@ -71,11 +71,8 @@ def _sound(path: Path, values: NDArray[np.float64], rate: float, unit: str) -> N
 
 def _table(head: str, separator: str, *, comma: bool = False, time: bool = True) -> Writer:
     def write(path: Path, values: NDArray[np.float64], rate: float, unit: str) -> None:
-        rows = (
-            separator.join([f"{i / rate:.9f}"] * time + [f"{value:.17g}"])
-            for i, value in enumerate(values)
-        )
-        text = "\n".join(rows) + "\n"
+        cells = ([f"{i / rate:.9f}"] * time + [f"{x:.17g}"] for i, x in enumerate(values))
+        text = "\n".join(map(separator.join, cells)) + "\n"
         if comma:
             text = text.replace(".", ",")
         path.write_text(head.format(rate=rate, unit=unit, step=1 / rate) + text, encoding="utf-8")

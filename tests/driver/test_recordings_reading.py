@@ -127,10 +127,8 @@ def test_polarity_of_a_record_without_quiet(cut: float, sign: int) -> None:
 def test_quiet_is_found_at_either_end() -> None:
     # A pulse on 500 N, the begin or the end of which is missing.
     force = 500 + 1500 * np.sin(np.linspace(0.4, np.pi, 985))
-    for record in (
-        np.append(force, np.full(15, 500.0)),
-        np.append(np.full(15, 500.0), force[::-1]),
-    ):
+    quiet = np.full(15, 500.0)
+    for record in (np.append(force, quiet), np.append(quiet, force[::-1])):
         above, below = find_peaks(Signal.from_array(record, RATE))
         assert (above, below) == (record.max() - 500, 500 - record.min())
 
@@ -195,9 +193,7 @@ def test_calibrations_lead_to_newtons(
         ("german.csv", "1600", ""),
     ],
 )
-def test_calibration_states_the_unit_of_values_without_one(
-    name: str, calibration: str, unit: str
-) -> None:
+def test_calibration_states_the_unit_of_values(name: str, calibration: str, unit: str) -> None:
     WRITERS[name](Path(name), FORCE / FULL_SCALE, RATE, "V")
     signal, force = read_all(name, calibration=calibration)
     np.testing.assert_allclose(force, FORCE, atol=1e-3)
@@ -437,9 +433,7 @@ def test_arrays_are_signals() -> None:
     assert signal.checksum == Signal.from_array([0, 1, 2], 8000).checksum
 
 
-def test_calibration_does_not_depend_on_the_blocks_that_are_read(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_calibration_does_not_depend_on_blocks_read(monkeypatch: pytest.MonkeyPatch) -> None:
     record = Signal.from_array(noisy(np.repeat([0.0, 1.0, 0.0], 20_003), 0.01), 5000.0)
     found = calibrate(record, force=10.0, unit="V")
     monkeypatch.setattr("thud.recordings.calibration.BLOCK", 1000)
@@ -488,9 +482,7 @@ ANY_VALUE = SCALARS | LISTS | st.dictionaries(st.text(), SCALARS | LISTS, max_si
 @pytest.mark.parametrize("kind", KINDS)
 @given(data=st.data())
 @settings(max_examples=50, deadline=None)
-def test_any_value_is_accepted_or_refused_by_the_name_of_its_key(
-    kind: type, data: st.DataObject
-) -> None:
+def test_any_value_is_accepted_or_refused_by_its_key(kind: type, data: st.DataObject) -> None:
     key = data.draw(st.sampled_from([entry.name for entry in fields(kind)]))
     try:
         kind(**KINDS[kind] | {key: data.draw(ANY_VALUE)})
@@ -501,8 +493,7 @@ def test_any_value_is_accepted_or_refused_by_the_name_of_its_key(
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_key_of_a_configuration_is_documented(kind: type) -> None:
-    pages = "".join(
-        (REPOSITORY / f"docs/{name}.md").read_text() for name in ("recordings_reading", "report")
-    )
+    names = "recordings_reading", "report"
+    pages = "".join((REPOSITORY / f"docs/{name}.md").read_text() for name in names)
     keys = [entry.name for entry in fields(kind)]
     assert [key for key in keys if f"`{key}`" not in pages and f"[{key}]" not in pages] == []

@@ -6,22 +6,20 @@ import random
 import re
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING
+from itertools import product
 
 import numpy as np
 import pytest
 from conftest import naming
 from recording_files import opened
+from refusals.core import write
 
 import thud
 from thud.base.units import UNITS, find_unit
 from thud.recordings.formats.text import read_channels, read_table
 from thud.studies.fitting.record import read_record, time_and_force
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
-
+pytestmark = pytest.mark.usefixtures("working_directory")
 RATE = 8000.0
 ROWS = 40
 PULSE = 1500 * np.sin(np.pi * np.arange(ROWS) / ROWS) ** 2
@@ -142,13 +140,13 @@ def draw_rows(chance: random.Random, columns: list[Written], separator: str) -> 
     return rows
 
 
-def is_read(path: Path, seed: int) -> bool:
+def is_read(seed: int) -> bool:
     """Whether a drawn table is read, not refused, and then with its numbers, units and rate."""
     chance = random.Random(seed)  # noqa: S311 - layouts are no secrets
     text, columns, has_units = draw_table(chance)
     coding = chance.choice(["utf-8", "utf-8", "utf-8-sig", "utf-16", "latin-1"])
     end = chance.choice(["\n", "\r\n"])
-    path.write_bytes(text.replace("\n", end).encode(coding))
+    path = write("plate.csv", text.replace("\n", end).encode(coding))
     try:
         table = read_table(path)
         is_force = any(UNITS.get(find_unit(c.unit), ("",))[0] == "N" for c in table.columns)
@@ -179,9 +177,8 @@ def is_read(path: Path, seed: int) -> bool:
 @pytest.mark.parametrize(
     ("count", "first"), [(300, 0), pytest.param(10_000, 1000, marks=pytest.mark.slow)]
 )
-def test_random_layouts_are_read_right_or_refused(count: int, first: int, tmp_path: Path) -> None:
-    seeds = range(first, first + count)
-    assert sum(is_read(tmp_path / "plate.csv", seed) for seed in seeds) > 0.5 * count
+def test_random_layouts_are_read_right_or_refused(count: int, first: int) -> None:
+    assert sum(is_read(seed) for seed in range(first, first + count)) > 0.5 * count
 
 
 # Ordinary layouts of loggers and spreadsheets: lines above the numbers, and a row of
@@ -254,7 +251,7 @@ LAYOUTS = [
 )
 @pytest.mark.parametrize(("unit", "head", "row"), LAYOUTS)
 def test_ordinary_layouts_are_read_with_their_units(
-    unit: str, head: str, row: str, coding: tuple[str, str], tmp_path: Path
+    unit: str, head: str, row: str, coding: tuple[str, str]
 ) -> None:
     base, size = UNITS[unit]
     size *= SENSITIVITY if base == "V" else 1.0
@@ -266,10 +263,9 @@ def test_ordinary_layouts_are_read_with_their_units(
     ]  # fmt: skip
     commas = [{key.upper(): cell.replace(".", ",") for key, cell in n.items()} for n in numbers]
     lines = [row.format(**n, **c) for n, c in zip(numbers, commas, strict=True)]
-    path = tmp_path / "plate.csv"
     text = "\n".join([head.removesuffix("\n"), *lines, ""]).lstrip("\n")
     encoding, end = coding
-    path.write_bytes(text.replace("\n", end).encode(encoding, errors="ignore"))
+    path = write("plate.csv", text.replace("\n", end).encode(encoding, errors="ignore"))
     stated = {"calibration": f"{SENSITIVITY} N/V"} if base == "V" else {}
     choice = {"channels": "sum"} if "F2" in head else {"channel": 1} if "],G" in head else {}
     (signal,) = opened(path, **stated, **choice)
@@ -298,15 +294,14 @@ EXCEL = datetime(2026, 11, 23, 9, 58, 59, 980000)  # noqa: DTZ001 - spreadsheets
         ("Date;Force [kN]", "%M:%S.%f"),
     ],
 )
-def test_dates_and_times_of_day_show_no_rate(title: str, shown: str, tmp_path: Path) -> None:
+def test_dates_and_times_of_day_show_no_rate(title: str, shown: str) -> None:
     mark = "," if ",%f" in shown else "."
     rows = (
         (EXCEL + timedelta(seconds=i / RATE)).strftime(shown)
         + f";{force / 1e3:.6f}".replace(".", mark)
         for i, force in enumerate(PULSE)
     )
-    path = tmp_path / "excel.csv"
-    path.write_text("\n".join([title, *rows]), encoding="utf-8")
+    path = write("excel.csv", "\n".join([title, *rows]))
     with pytest.raises(thud.InputError, match=naming("excel.csv", "sample_rate")):
         opened(path)
     (signal,) = opened(path, sample_rate=8000)
@@ -325,19 +320,17 @@ def test_dates_and_times_of_day_show_no_rate(title: str, shown: str, tmp_path: P
     ],
 )
 def test_headers_are_read_in_encodings_of_spreadsheets(
-    rate: str, name: str, unit: str, encoding: str, tmp_path: Path
+    rate: str, name: str, unit: str, encoding: str
 ) -> None:
-    path = tmp_path / "drop.csv"
     rows = "\n".join(f"{force:.6f}" for force in PULSE)
-    path.write_bytes(f"{rate}\n{name}{unit}\n{rows}".encode(encoding))
+    path = write("drop.csv", f"{rate}\n{name}{unit}\n{rows}".encode(encoding))
     (channel,) = read_channels(path)
     assert (channel.sample_rate, channel.unit, channel.name) == (RATE, "N", name)
 
 
 @pytest.mark.parametrize("head", ["Time;Plate\n[s];[stone]", "[s];[stone]\nTime;Plate"])
-def test_units_in_brackets_are_no_titles(head: str, tmp_path: Path) -> None:
-    (tmp_path / "t.csv").write_text(f"{head}\n0.5;1\n")
-    columns = read_table(tmp_path / "t.csv").columns
+def test_units_in_brackets_are_no_titles(head: str) -> None:
+    columns = read_table(write("t.csv", f"{head}\n0.5;1\n")).columns
     assert [(column.name, column.unit) for column in columns] == [("Time", "s"), ("Plate", "stone")]
 
 
@@ -350,9 +343,8 @@ def test_spellings_of_units(text: str, unit: str) -> None:
     assert find_unit(text) == unit
 
 
-def rows_read(text: str, folder: Path) -> np.ndarray:
-    (folder / "plate.csv").write_text(text)
-    return np.column_stack([c.values for c in read_table(folder / "plate.csv").columns])
+def rows_read(text: str) -> np.ndarray:
+    return np.column_stack([c.values for c in read_table(write("plate.csv", text)).columns])
 
 
 @pytest.mark.parametrize(
@@ -377,23 +369,20 @@ def rows_read(text: str, folder: Path) -> np.ndarray:
         ("1,575;2,125e3", (1.575, 2125)),
     ],
 )
-def test_decimal_mark_is_that_of_the_whole_table(
-    line: str, expected: tuple[float, ...], tmp_path: Path
-) -> None:
+def test_decimal_mark_is_that_of_the_whole_table(line: str, expected: tuple[float, ...]) -> None:
     # Lines that decide nothing stand above the one that does.
     separator = next(mark for mark in "\t; ," if mark in line.replace("2 ", "").replace("4 ", ""))
     integers = [(3 * i % 5, 7 * i % 4) for i in range(8)]
     above = "".join(f"{i}{separator}{k}\n" for i, k in [("x", "y"), *integers])
-    np.testing.assert_array_equal(rows_read(above + line + "\n", tmp_path), [*integers, expected])
+    np.testing.assert_array_equal(rows_read(above + line + "\n"), [*integers, expected])
 
 
 @pytest.mark.parametrize("empty", ["\n" * 8, " \n" * 8])
 def test_empty_lines_behind_a_table_are_left_out(
-    empty: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    empty: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("thud.recordings.formats.text.BLOCK", 8)
-    found = rows_read("7, 0.250\n" * 8 + empty, tmp_path)
-    np.testing.assert_array_equal(found, [(7, 0.25)] * 8)
+    np.testing.assert_array_equal(rows_read("7, 0.250\n" * 8 + empty), [(7, 0.25)] * 8)
 
 
 # Rate of recorders of sound, Hz.
@@ -401,11 +390,8 @@ CD = 44100.0
 
 
 @pytest.mark.parametrize(
-    ("form", "begin"),
-    [
-        *((form, 0.2) for form in (".5f", ".6f", ".7f", ".9f", ".6e", ".18e", "")),
-        *((form, 123.0) for form in (".5f", ".6f", ".9f", ".18e", "")),
-    ],
+    ("begin", "form"),
+    [*product((0.2, 123.0), (".5f", ".6f", ".7f", ".9f", ".18e", "")), (0.2, ".6e")],
 )
 def test_rounded_times_are_even(form: str, begin: float) -> None:
     time = begin + np.arange(500) / CD
@@ -413,9 +399,8 @@ def test_rounded_times_are_even(form: str, begin: float) -> None:
     record = read_record(np.column_stack([written, np.sin(np.linspace(0, np.pi, 500))]))
     # The slope of a line through n points of standard deviation s has that of s sqrt(12 / n^3).
     digit = float(np.abs(written - time).max())
-    assert record.sample_rate == pytest.approx(
-        CD, rel=4 * digit / np.sqrt(3) * CD * np.sqrt(12 / 500**3) + 1e-9
-    )
+    slope = digit / np.sqrt(3) * CD * np.sqrt(12 / 500**3)
+    assert record.sample_rate == pytest.approx(CD, rel=4 * slope + 1e-9)
     # The begin of the line has 2/sqrt(n) of that of a time.
     deviation = 2 * digit / np.sqrt(3 * 500)
     assert record.time[0] == pytest.approx(begin, abs=4 * deviation + 1e-12)
