@@ -23,18 +23,9 @@ if TYPE_CHECKING:
 
 # What is only imported for the table.
 __all__ = [
-    "Config",
-    "Signal",
-    "band_filters",
-    "filter_levels",
-    "find_drops",
-    "half_sines",
-    "measure_drop",
-    "only_section",
-    "recording_of",
-    "repair",
-    "uncertain_contact",
-]
+    "Config", "Signal", "band_filters", "filter_levels", "find_drops", "half_sines",
+    "measure_drop", "only_section", "recording_of", "repair", "uncertain_contact",
+]  # fmt: skip
 
 TIMES = 0.2 + np.arange(500) / 44100
 SHELL = thud.solve(duration=0.03)

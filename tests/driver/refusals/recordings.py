@@ -28,6 +28,14 @@ from recording_files import (
 )
 from refusals.core import write
 from synthetic import half_sine as pulse
+from test_recordings_calibration import (
+    DROOPED,
+    STEADY,
+    TIME as WEIGHING,
+    calibrated as weight,
+    high_pass,
+    weighed,
+)
 
 import thud
 from thud.recordings.calibration import calibrate
@@ -45,20 +53,10 @@ if TYPE_CHECKING:
 
 # What is only imported for the table.
 __all__ = [
-    "Calibration",
-    "add_signals",
-    "h5py",
-    "newtons_per_unit",
-    "noisy",
-    "orient",
-    "os",
-    "patch",
-    "pulse",
-    "recording_file",
-    "steps",
-    "struct",
-    "to_channels",
-]
+    "DROOPED", "STEADY", "Calibration", "add_signals", "h5py", "high_pass", "newtons_per_unit",
+    "noisy", "orient", "os", "patch", "pulse", "recording_file", "steps", "struct", "to_channels",
+    "weighed", "weight",
+]  # fmt: skip
 
 TIME = np.arange(len(FORCE)) / RATE
 
@@ -176,6 +174,11 @@ def config(text: str) -> Config:
 def known(values: ArrayLike, **stated: Any) -> Calibration:  # noqa: ANN401
     """Return the calibration of a record."""
     return calibrate(Signal.from_array(values, 5000.0), **{"unit": "V", **stated})
+
+
+def crept(end: float) -> NDArray[np.float64]:
+    """Return the creep of a load cell after a weight is put on, 1."""
+    return np.log1p(np.maximum(WEIGHING - end, 0) / 0.5)
 
 
 def tap(values: ArrayLike, rate: float = 2e4) -> Any:  # noqa: ANN401
