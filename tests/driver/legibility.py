@@ -76,10 +76,6 @@ def _ink(figure: Figure, text: Text) -> Ink:
     return np.asarray(binary_dilation(np.asarray(renderer.buffer_rgba())[..., 3] > 0))
 
 
-def _quoted(text: Text) -> str:
-    return repr(text.get_text())
-
-
 def find_faults(figure: Figure) -> list[str]:
     """Return what is not legible in a figure that is shown at the width of a column."""
     figure.set_dpi(DPI)
@@ -87,22 +83,21 @@ def find_faults(figure: Figure) -> list[str]:
     # What is hidden in turn must not move the rest.
     figure.set_layout_engine("none")
     drawn = _draw(figure)
-    faults = [
-        f"{_quoted(text)}: {size * COLUMN / figure.get_figwidth():.2f} pt"
-        for text, size in drawn.sizes.items()
-        if size * COLUMN / figure.get_figwidth() < SMALLEST
-    ]
-    inks = {text: _ink(figure, text) for text in dict.fromkeys(drawn.texts)}
+    names = {text: repr(text.get_text()) for text in drawn.texts}
+    scale = COLUMN / figure.get_figwidth()
+    sizes = {text: scale * size for text, size in drawn.sizes.items()}
+    faults = [f"{names[text]}: {size:.2f} pt" for text, size in sizes.items() if size < SMALLEST]
+    inks = {text: _ink(figure, text) for text in names}
     for (first, ink), (second, other) in combinations(inks.items(), 2):
         if (ink & other).any():
-            faults.append(f"{_quoted(first)} and {_quoted(second)} overlap")
+            faults.append(f"{names[first]} and {names[second]} overlap")
     behind = _draw(figure, with_text=False).picture()
     for text, ink in inks.items():
         if ink.any() and np.ptp(behind[ink], axis=0).max() > CONTRAST:
-            faults.append(f"{_quoted(text)} is on a mark")
+            faults.append(f"{names[text]} is on a mark")
         box = text.get_window_extent()
         if (box.min < -1).any() or (box.max > figure.bbox.max + 1).any():
-            faults.append(f"{_quoted(text)} is cut")
+            faults.append(f"{names[text]} is cut")
     return faults + [f"{name!r} is not seen" for name in _find_hidden(figure, behind)]
 
 

@@ -118,13 +118,9 @@ def faulty_figure() -> Figure:
 def test_each_fault_is_found() -> None:
     faults = " ".join(find_faults(faulty_figure()))
     for fault in (
-        "'crossed' is on a mark",
-        "'one' and 'two' overlap",
-        "'small': 5.90 pt",
-        "small}$': 5.60 pt",
-        "'longer than the axes' is cut",
-        "'below' is not seen",
+        "'crossed' is on a mark", "'one' and 'two' overlap", "'small': 5.90 pt",
+        "small}$': 5.60 pt", "'longer than the axes' is cut", "'below' is not seen",
         "'nowhere' is not seen",
-    ):
+    ):  # fmt: skip
         assert fault in faults, fault
     assert "above" not in faults
