@@ -95,6 +95,7 @@ def make_recording(  # noqa: PLR0913 - each is one fault
     noise_db: float = np.inf,
     colour: str = "white",
     offset: float = 0.0,
+    drift: float = 0.0,
     hum: tuple[float, float] = (50.0, 0.0),
     before: float = 0.1,
     after: float = 0.1,
@@ -123,7 +124,7 @@ def make_recording(  # noqa: PLR0913 - each is one fault
     clean = np.zeros(n)
     for start, factor in drops:
         clean += factor * np.interp(time - start, grid, force, left=0.0, right=0.0)
-    recording = clean + offset
+    recording = clean + offset + drift * time
     frequency, amplitude = hum
     for k, part in enumerate(HARMONICS, start=1):
         phase = rng.uniform(0, 2 * np.pi)
