@@ -13,12 +13,12 @@ from typing import get_origin
 
 import pytest
 from conftest import REPOSITORY, naming, python
+from test_examples import EXAMPLES
 
 import thud
 from thud.base._schema import MODELS
 
 DRIVER = REPOSITORY / "driver"
-SCRIPT = Path(__file__).with_name("user_script.py")
 # What NumPy's own types hold: shapes of any dimension, data of any type.
 NUMPY = r"tuple\[Any, \.\.\.\]|numpy\.(dtype|generic)\[Any\]"
 WRONG = {
@@ -78,22 +78,11 @@ def test_calls_of_each_model_are_those_of_solve() -> None:
 
 
 @pytest.mark.slow
-def test_users_script_touches_every_name_and_runs(tmp_path: Path) -> None:
-    nodes = ast.walk(ast.parse(SCRIPT.read_text()))
-    used = {ast.unparse(node) for node in nodes if isinstance(node, ast.Attribute)}
-    assert {f"thud.{name}" for name in thud.__all__} <= used
-    environment = {**os.environ, "TMPDIR": str(tmp_path)}
-    done = python(SCRIPT, env=environment)
-    assert done.returncode == 0, done.stderr
-    assert re.search("<Uncertainty, rubber_ball: . of 8 samples conform>", done.stdout)
-
-
-@pytest.fixture(scope="module")
-def checked(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
-    """Return what mypy says of the user's script, of all names and of wrong calls, by file."""
-    folder = tmp_path_factory.mktemp("typed")
-    (folder / "script.py").write_text(SCRIPT.read_text())
-    (folder / "wrong.py").write_text("\n".join(["import thud", *WRONG]))
+def test_type_checkers_know_all_types_and_which_calls_are_wrong(tmp_path: Path) -> None:
+    """The examples of the documentation are typed, no public name is of any type."""
+    for i, example in enumerate(EXAMPLES):
+        (tmp_path / f"example_{i}.py").write_text(example.code)
+    (tmp_path / "wrong.py").write_text("\n".join(["import thud", *WRONG]))
     lines = ["import thud"]
     for name in thud.__all__:
         found = getattr(thud, name)
@@ -103,37 +92,21 @@ def checked(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[str]]:
             names = dict.fromkeys([*getattr(found, "__dataclass_fields__", ()), *dir(found)])
             lines += [f"    reveal_type(it.{one})" for one in names if not one.startswith("_")]
             lines.append("    return")
-    (folder / "names.py").write_text("\n".join(lines))
-    command = ["-m", "mypy", "--strict", *sorted(folder.glob("*.py"))]
-    done = python(*command, cwd=folder, env={**os.environ, "MYPYPATH": str(DRIVER)})
-    said: dict[str, list[str]] = {"script": [], "wrong": [], "names": []}
-    for line in done.stdout.splitlines():
-        if match := re.match(r"(\w+)\.py:", line):
-            said[match[1]].append(line)
-    assert said["names"], done.stdout + done.stderr
-    return said
-
-
-@pytest.mark.slow
-def test_users_script_is_typed(checked: dict[str, list[str]]) -> None:
-    assert checked["script"] == []
-
-
-@pytest.mark.slow
-def test_no_public_name_is_of_any_type(checked: dict[str, list[str]]) -> None:
-    assert not [line for line in checked["names"] if "Revealed type is" not in line]
-    assert len(checked["names"]) > len(thud.__all__)
-    loose = [line for line in checked["names"] if re.search(r"\bAny\b", re.sub(NUMPY, "", line))]
-    assert loose == []
-
-
-@pytest.mark.slow
-def test_wrong_calls_are_errors_of_type_checkers(checked: dict[str, list[str]]) -> None:
-    errors = [
-        re.match(r"wrong\.py:(\d+): error: .*\[([\w-]+)\]$", line) for line in checked["wrong"]
-    ]
-    found = {int(match[1]): match[2] for match in errors if match}
-    assert found == dict(enumerate(WRONG.values(), start=2))
+    (tmp_path / "names.py").write_text("\n".join(lines))
+    command = ["-m", "mypy", "--strict", *sorted(tmp_path.glob("*.py"))]
+    done = python(*command, cwd=tmp_path, env={**os.environ, "MYPYPATH": str(DRIVER)})
+    said = re.findall(r"^(\w+)\.py:(\d+): (.*)$", done.stdout, re.MULTILINE)
+    types = [text for file, _, text in said if file == "names"]
+    assert len(types) > len(thud.__all__), done.stdout + done.stderr
+    assert [text for text in types if "Revealed type is" not in text] == []
+    assert [text for text in types if re.search(r"\bAny\b", re.sub(NUMPY, "", text))] == []
+    assert [line for line in said if line[0].startswith("example")] == []
+    errors = {
+        int(line): text.rpartition("[")[2].rstrip("]")
+        for file, line, text in said
+        if file == "wrong" and text.startswith("error: ")
+    }
+    assert errors == dict(enumerate(WRONG.values(), start=2))
 
 
 def test_names_whose_packages_are_missing_say_so() -> None:
@@ -173,8 +146,3 @@ def test_misspelt_names_are_told() -> None:
         thud.slove  # noqa: B018
     with pytest.raises(AttributeError, match=naming("'cube'")):
         thud.cube  # noqa: B018
-
-
-def test_standard_ball_conforms(flagship: thud.Impact) -> None:
-    assert flagship.assess()
-    assert flagship.notes == ()

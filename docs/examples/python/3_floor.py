@@ -26,8 +26,9 @@ print(thud.solve(floor=thud.construction("joists, 1 board").floor))
 
 # %% FloorImpact, FloorEnergy
 moved = thud.solve(floor=thud.Plate(thickness=0.14)).on_floor
-print(moved)
-print(moved.floor_work, "J")
+if moved:
+    print(moved)
+    print(moved.floor_work, "J")
 
 # %% Rigid, InfinitePlate, Oscillator, FloorName
 for floor in (
@@ -43,7 +44,7 @@ found = thud.mobility(thud.InfinitePlate(resistance=1600.0), frequency)
 print(found.values)
 
 # %% read_mobility, fit_mobility, MobilityFit, MeasuredMobility
-slab = thud.read_case("inputs/floors/modal_slab.nml").floor
+slab = thud.ModalFloor(file="inputs/floors/modal_slab.csv", source_x=0.4, source_y=0.35)
 thud.mobility(slab, np.arange(12.0, 300.0)).save("measured.csv")
 fitted = thud.fit_mobility(thud.read_mobility("measured.csv"))
 print(fitted)

@@ -8,7 +8,8 @@ import thud
 try:
     thud.solve(thud.Ball(mass=-1.0))
 except thud.ThudError as error:
-    print(type(error).__name__, error.note.subject, error.note.low, error.note.high)
+    if note := error.note:
+        print(type(error).__name__, note.subject, note.low, note.high)
 
 # %% PlausibilityWarning
 with warnings.catch_warnings(record=True, action="always") as caught:
