@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import shutil
-from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,8 +15,9 @@ from thud.comparison.comparison import Comparison
 from thud.plot.style import WIDTH
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
+
+    from playwright.sync_api import Browser, Locator, Page
 
 SHELL, SOFT = thud.solve(), thud.solve(thud.Ball(youngs_modulus=1.2e6), duration=0.5)
 IMPACTS: dict[str, thud.Impact | thud.Recording] = {"shell <1>": SHELL, "soft $x^{$": SOFT}
@@ -83,35 +82,26 @@ def test_picture_is_a_column_wide_for_any_number_of_cases(count: int) -> None:
     assert_clean(figure)
 
 
-@contextmanager
-def open_in_browser(path: Path, html: str) -> Iterator[Any]:
-    """Open a page of text in a browser."""
-    sync_api = pytest.importorskip("playwright.sync_api")
-    chromium = shutil.which("chromium") or shutil.which("google-chrome")
-    if chromium is None:
-        pytest.skip("there is no chromium")
+def open_in(browser: Browser, path: Path, html: str) -> Page:
+    """Return the tab of a page of text."""
     path.write_text(html, encoding="utf-8")
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
-        page = browser.new_page()
-        page.goto(path.as_uri())
-        yield page
-        browser.close()
+    page = browser.new_page()
+    page.goto(path.as_uri())
+    return page
 
 
-def test_browser_draws_the_curves_and_hides_them(tmp_path: Path) -> None:
-    sync_api = pytest.importorskip("playwright.sync_api")
-    html = COMPARISON.html()
-    with open_in_browser(tmp_path / "page.html", html) as page:
-        curves = page.locator(".plot .curve")
-        # Two curves in three plots; five octaves have a tolerance.
-        sync_api.expect(curves).to_have_count(6)
-        sync_api.expect(page.locator(".limits")).to_have_count(5)
-        page.locator(".legend button").first.click()
-        sync_api.expect(curves).to_have_count(3)
+def test_browser_draws_the_curves_and_hides_them(browser: Browser, tmp_path: Path) -> None:
+    page = open_in(browser, tmp_path / "page.html", COMPARISON.html())
+    expect = pytest.importorskip("playwright.sync_api").expect
+    curves = page.locator(".plot .curve")
+    # Two curves in three plots; five octaves have a tolerance.
+    expect(curves).to_have_count(6)
+    expect(page.locator(".limits")).to_have_count(5)
+    page.locator(".legend button").first.click()
+    expect(curves).to_have_count(3)
 
 
-def assert_scrolls_inside(page: Any, table: Any, width: int) -> None:  # noqa: ANN401 - of playwright
+def assert_scrolls_inside(page: Page, table: Locator, width: int) -> None:
     """Assert that a table, not the page, scrolls, and keeps the titles of its rows."""
     page.set_viewport_size({"width": width, "height": 800})
     # Plots are drawn again.
@@ -126,11 +116,10 @@ def assert_scrolls_inside(page: Any, table: Any, width: int) -> None:  # noqa: A
 
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [320, 390, 1000])
-def test_table_scrolls_inside_a_narrow_page(width: int, tmp_path: Path) -> None:
-    html = long_names(9).html()
-    with open_in_browser(tmp_path / "page.html", html) as page:
-        assert_scrolls_inside(page, page.locator(".table"), width)
-        # At least two columns of numbers are in sight.
-        second = page.locator("tbody tr").first.locator("td").nth(2)
-        page.locator(".table").evaluate("e => { e.scrollLeft = 0; }")
-        assert second.evaluate("e => e.getBoundingClientRect().right") <= width
+def test_table_scrolls_inside_a_narrow_page(browser: Browser, width: int, tmp_path: Path) -> None:
+    page = open_in(browser, tmp_path / "page.html", long_names(9).html())
+    assert_scrolls_inside(page, page.locator(".table"), width)
+    # At least two columns of numbers are in sight.
+    second = page.locator("tbody tr").first.locator("td").nth(2)
+    page.locator(".table").evaluate("e => { e.scrollLeft = 0; }")
+    assert second.evaluate("e => e.getBoundingClientRect().right") <= width

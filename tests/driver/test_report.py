@@ -21,7 +21,7 @@ from hypothesis import given, settings, strategies as st
 from matplotlib import font_manager
 from scipy.special import stdtrit
 from synthetic import make_recording, with_force
-from test_comparison_page import assert_scrolls_inside, open_in_browser
+from test_comparison_page import assert_scrolls_inside, open_in
 from test_figure_look import assert_clean
 
 import thud
@@ -52,6 +52,8 @@ from thud.report.rows import criterion_row, drop_table, freedom_text, risk_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from playwright.sync_api import Browser
 
 UNKNOWN = Estimate(float("nan"), float("nan"))
 LAB = Config(
@@ -217,7 +219,6 @@ def one_drop(one: Recording) -> Recording:
 
 @pytest.fixture(scope="module")
 def recordings(one: Recording, laboratory: Recording) -> dict[str, Recording]:
-    """Return the recordings of which reports are written."""
     makers = (one_drop, sixty_drops, hostile, crowded)
     return {"laboratory": laboratory, **{make.__name__: make(one) for make in makers}}
 
@@ -276,7 +277,6 @@ class Skeleton(HTMLParser):
 
 @pytest.fixture(scope="module")
 def harmless(one: Recording) -> Skeleton:
-    """Return the tags of a page whose texts are a letter."""
     return Skeleton(report_page(report_data(hostile(one, "x"))))
 
 
@@ -291,7 +291,6 @@ def test_no_text_is_markup(one: Recording, harmless: Skeleton, text: str) -> Non
 
 @pytest.fixture(scope="module")
 def weasyprint() -> None:
-    """Skip what needs the extra report where it is not installed."""
     pytest.importorskip(
         "weasyprint", reason="the extra report is not installed", exc_type=ImportError
     )
@@ -304,7 +303,6 @@ def written(
     weasyprint: None,  # noqa: ARG001
     tmp_path_factory: pytest.TempPathFactory,
 ) -> tuple[Recording, Path]:
-    """Write the report of a recording of each kind."""
     recording = recordings[request.param]
     folder = tmp_path_factory.mktemp("written")
     paths = write_report(recording, folder)
@@ -318,7 +316,6 @@ def open_pdf(path: Path) -> Any:  # noqa: ANN401 - of pypdfium2
 
 
 def data_of(recording: Recording) -> dict[str, Any]:
-    """Return the content of ``report.json``."""
     data: dict[str, Any] = json.loads(json_bytes(report_data(recording)))
     return data
 
@@ -445,9 +442,7 @@ def test_without_weasyprint_there_is_a_page_and_a_sentence(
 
 
 @pytest.mark.usefixtures("weasyprint")
-def test_missing_font_is_told(
-    one: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_absent_font_warns(one: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(font_manager, "findSystemFonts", list)
     recording = replace(one, config=replace(LAB, laboratory="建材 lab"))
     with pytest.warns(ReportWarning, match=naming("font", "建材")):
@@ -492,9 +487,7 @@ def test_mark_is_in_the_page_and_its_path_nowhere(laboratory: Recording) -> None
     assert str(path.parent) not in page + json_bytes(data).decode()
 
 
-def test_what_iso_17025_asks_for_and_is_not_stated_is_listed(
-    one: Recording, laboratory: Recording
-) -> None:
+def test_missing_keys_of_iso_17025_are_listed(one: Recording, laboratory: Recording) -> None:
     config, origins = laboratory.config, laboratory.origins
     assert missing_keys(config, origins) == ["instruments: certificate"]
     for key in ("traceability", "place"):
@@ -548,9 +541,7 @@ def excluded(recording: Recording) -> dict[str, list[str]]:
 SCATTER = "scatter between drops"
 
 
-def test_uncertainties_that_lack_contributions_are_marked(
-    one: Recording, laboratory: Recording
-) -> None:
+def test_uncertainties_that_lack_parts_are_marked(one: Recording, laboratory: Recording) -> None:
     # Of one drop nothing is stated, and the scatter is unknown.
     lacking = excluded(one)
     assert {name: lacking[name] for name in lacking if "octave" not in name} == {
@@ -609,11 +600,10 @@ def test_report_lists_single_drops(one: Recording) -> None:
 
 
 @pytest.mark.slow
-def test_budgets_scroll_inside_a_narrow_page(laboratory: Recording, tmp_path: Path) -> None:
-    source = report_page(report_data(laboratory))
-    with open_in_browser(tmp_path / "report.html", source) as page:
-        for width in (390, 1000):
-            assert_scrolls_inside(page, page.locator(".budget"), width)
+def test_budgets_scroll_in_a_page(browser: Browser, laboratory: Recording, tmp_path: Path) -> None:
+    page = open_in(browser, tmp_path / "report.html", report_page(report_data(laboratory)))
+    for width in (390, 1000):
+        assert_scrolls_inside(page, page.locator(".budget"), width)
 
 
 @pytest.mark.parametrize(

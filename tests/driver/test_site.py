@@ -5,7 +5,6 @@ from __future__ import annotations
 import fcntl
 import os
 import re
-import shutil
 from html.parser import HTMLParser
 from types import FunctionType
 from typing import TYPE_CHECKING
@@ -17,14 +16,12 @@ from conftest import REPOSITORY, python
 import thud
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
     from pathlib import Path
 
-    from playwright.sync_api import Page as Tab
+    from playwright.sync_api import Browser, Page as Tab
 
 pytestmark = pytest.mark.slow
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 THEORY = (
     *("hollow_sphere", "lumped_models", "modal_ball", "finite_elements", "compression"),
     *("ball_impedance", "floors", "room_theory", "levels", "recordings_theory"),
@@ -121,7 +118,6 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def pages(site: Path) -> dict[str, Page]:
-    """Return all pages of the site by their addresses."""
     return {
         path.relative_to(site).as_posix(): Page(path.read_text(encoding="utf-8"))
         for path in site.rglob("*.html")
@@ -129,15 +125,8 @@ def pages(site: Path) -> dict[str, Page]:
 
 
 @pytest.fixture(scope="module")
-def tab() -> Iterator[Tab]:
-    """Return a page of a browser."""
-    if CHROMIUM is None:
-        pytest.skip("needs Debian's chromium")
-    api = pytest.importorskip("playwright.sync_api")
-    with api.sync_playwright() as playwright:
-        started = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield started.new_page()
-        started.close()
+def tab(browser: Browser) -> Tab:
+    return browser.new_page()
 
 
 def test_no_link_is_broken(site: Path, pages: dict[str, Page]) -> None:
@@ -172,9 +161,7 @@ def test_every_page_of_the_documentation_is_in_the_site(pages: dict[str, Page]) 
         assert place in pages["index.html"].links, page
 
 
-def test_each_page_states_the_version_and_the_site_is_small(
-    site: Path, pages: dict[str, Page]
-) -> None:
+def test_pages_state_the_version_and_are_small(site: Path, pages: dict[str, Page]) -> None:
     version = f"thud {thud.__version__}"
     assert not [name for name, page in pages.items() if version not in page.words]
     assert sum(path.stat().st_size for path in site.rglob("*") if path.is_file()) < SIZE
@@ -199,9 +186,7 @@ def test_font_has_all_letters_of_formulas(pages: dict[str, Page]) -> None:
     assert set(range(0x1D6FC, 0x1D716)) <= known.keys()
 
 
-def test_python_reference_has_the_signature_of_each_name(
-    site: Path, pages: dict[str, Page]
-) -> None:
+def test_python_reference_has_all_signatures(site: Path, pages: dict[str, Page]) -> None:
     for name in NAMES:
         place = f"generated/thud.{name}.html"
         assert f"{place}#thud.{name}" in pages["python_reference.html"].links
