@@ -22,15 +22,7 @@ Served = tuple[str, "subprocess.Popen[str]"]
 
 @contextmanager
 def serve(*arguments: str, screen: IO[str] | None = None) -> Iterator[Served]:
-    """Yield the address of a server, and its process.
-
-    Parameters
-    ----------
-    *arguments
-        Of the command.
-    screen
-        File of the standard error; by default that of this process.
-    """
+    """Yield the address of a server, and its process; `screen` takes its errors."""
     command = [sys.executable, "-m", "thud", "explore", "--no-browser", *arguments]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=screen, text=True) as process:
         assert process.stdout is not None

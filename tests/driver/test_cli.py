@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import pytest
 from conftest import MINIMAL, REPOSITORY, RESULT_FILES, contents, names_in, naming, python
 
-import thud
 from thud import cli
 
 if TYPE_CHECKING:
@@ -86,9 +85,7 @@ def test_name_of_a_construction_is_a_floor(words: list[str], tmp_path: Path) -> 
     assert (tmp_path / "outputs/prediction").is_dir()
 
 
-def test_results_that_cannot_be_saved_are_told(
-    case_file: CaseFile, tmp_path: Path, errors_of: ErrorsOf
-) -> None:
+def test_unsaved_file_is_named(case_file: CaseFile, tmp_path: Path, errors_of: ErrorsOf) -> None:
     case = str(case_file(MINIMAL))
     assert cli.main(["run", "-q", "-o", "old", case]) == 0
     (tmp_path / "old/force.svg").unlink()
@@ -134,22 +131,7 @@ def test_files_named_as_modules_of_python_are_not_imported(
     assert (tmp_path / "outputs/case/force.csv").exists()
 
 
-def test_cases_of_one_name_do_not_replace_each_other(
-    case_file: CaseFile, tmp_path: Path, errors_of: ErrorsOf
-) -> None:
-    (tmp_path / "other").mkdir()
-    first = case_file(MINIMAL, "ball.nml")
-    second = case_file(MINIMAL.replace("&drop", "&drop height = 0.5"), "other/ball.nml")
-    assert re.search(
-        naming(first, second, "'ball'"),
-        errors_of("run", "-q", "--no-figures", first, second, "-o", "out"),
-    )
-    assert thud.read_results("out/ball").case.drop.height == 1.0
-
-
-def test_screen_without_the_letters_of_a_name_shows_their_codes(
-    case_file: CaseFile, tmp_path: Path
-) -> None:
+def test_screen_without_letters_shows_their_codes(case_file: CaseFile, tmp_path: Path) -> None:
     case_file(MINIMAL, "é.nml")
     environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
     done = python("-m", "thud", "run", "é.nml", "--no-figures", cwd=tmp_path, env=environment)

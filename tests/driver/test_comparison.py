@@ -43,9 +43,7 @@ def column(comparison: thud.Comparison, number: int = 1) -> dict[str, str]:
     return {row[0]: row[number] for row in comparison.rows()}
 
 
-def test_table_gives_every_criterion_beside_its_limits(
-    approved: Callable[[str, str], None],
-) -> None:
+def test_table_has_every_criterion_beside_its_limits(approved: Callable[[str, str], None]) -> None:
     comparison = thud.compare({"shell": SHELL}, force="elastic")
     rows = [row for row in comparison.rows() if row[0] != "computing time, ms"]
     assert len(rows) == len(comparison.rows()) - 1
@@ -110,9 +108,7 @@ def test_command_writes_the_page(tmp_path: Path, capsys: pytest.CaptureFixture[s
         ("margin", -0.001, 0, "0.00 low"),
     ],
 )  # fmt: skip
-def test_cell_tells_how_a_criterion_is_missed(
-    name: str, value: float, uncertainty: float, cell: str
-) -> None:
+def test_cells_of_missed_criteria(name: str, value: float, uncertainty: float, cell: str) -> None:
     assert _cell(Criterion(name, thud.Estimate(value, uncertainty), 38.0, 40.0)) == cell
 
 

@@ -102,7 +102,6 @@ WITHOUT_FIGURE = (thud.Rating, thud.Bands)
 
 @pytest.fixture(scope="module", params=RESULTS.items(), ids=map(str, range(len(RESULTS))))
 def example(request: pytest.FixtureRequest) -> tuple[Displayed, str]:
-    """Return a result and the ending of its file."""
     make, ending = request.param
     return made(make), ending
 
@@ -219,9 +218,7 @@ def test_warnings_are_shown() -> None:
     assert [note.message for note in odd.notes] == list(map(str, odd.notes)) != []
 
 
-def test_dataset_of_an_impact_has_units_and_provenance(
-    flagship: thud.Impact, tmp_path: Path
-) -> None:
+def test_impact_dataset_has_units_and_provenance(flagship: thud.Impact, tmp_path: Path) -> None:
     found = flagship.to_xarray()
     np.testing.assert_array_equal(found["floor_force"], flagship.floor_force)
     np.testing.assert_array_equal(

@@ -17,10 +17,8 @@ from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
 
 import f90nml
-import h5py
 import numpy as np
 import pytest
-import scipy.io
 import uvicorn
 from conftest import REPOSITORY
 from starlette.routing import Route
@@ -78,13 +76,11 @@ def new_client(start: dict[str, Any], **options: int) -> TestClient:
 
 @pytest.fixture(scope="module")
 def client() -> Iterator[TestClient]:
-    """Return a client of a server."""
     with new_client({}) as found:
         yield found
 
 
 def last_report(client: TestClient, path: str, **request: Any) -> dict[str, Any]:  # noqa: ANN401 - as the client
-    """Return the report of a task."""
     response = client.post(path, **request)
     assert response.status_code == 200, response.text
     found: dict[str, Any] = response.json()
@@ -92,7 +88,6 @@ def last_report(client: TestClient, path: str, **request: Any) -> dict[str, Any]
 
 
 def form_body(content: bytes, name: str = "a.wav") -> bytes:
-    """Return the body of a form with a case and a file."""
     head = f'Content-Disposition: form-data; name="file"; filename="{name}"'
     case = f'--edge\r\nContent-Disposition: form-data; name="case"\r\n\r\n{json.dumps(SHELL)}\r\n'
     return f"{case}--edge\r\n{head}\r\n\r\n".encode() + content + b"\r\n--edge--\r\n"
@@ -115,12 +110,10 @@ def form_of(
 
 
 def answer_of(client: TestClient, path: str, values: object) -> Any:  # noqa: ANN401 - as the client
-    """Return the answer of a task on a case."""
     return last_report(client, path, json=values)["answer"]
 
 
 def measured(client: TestClient, *files: tuple[str, bytes], **fields: Any) -> dict[str, Any]:  # noqa: ANN401 - of a form
-    """Return the answer to a recording."""
     found: dict[str, Any] = last_report(client, "/measure", **form_of(*files, **fields))["answer"]
     return found
 
@@ -194,9 +187,7 @@ def test_answer_is_that_of_the_library(client: TestClient) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("path", ["/solve", "/improve", "/download/case.nml", "/press", "/fit"])
-def test_files_named_by_a_page_are_neither_opened_nor_quoted(
-    client: TestClient, tmp_path: Path, path: str
-) -> None:
+def test_page_names_no_file_of_the_machine(client: TestClient, tmp_path: Path, path: str) -> None:
     (tmp_path / "secret").write_text("password 123\n")
     messages = set()
     for name in ("secret", "missing"):
@@ -254,12 +245,12 @@ def test_file_of_the_laboratory_is_read_with_its_recordings(client: TestClient) 
     assert answer["levels"]["level"] == pytest.approx(known.levels(), abs=1e-4)
     assert answer["asks"] == []
     # A field of the page replaces its value, and the others of the same table stay.
-    other = measured(client, *files, plate_Q=10)
+    other = measured(client, *files, plate_Q=10, source="tyre")
     assert other["levels"]["level"] != answer["levels"]["level"]
+    assert [other["criteria"][0][end] for end in ("lower", "upper")] == [46, 48]
 
 
 def table_of(force: np.ndarray, rate: float) -> tuple[str, bytes]:
-    """Return a file with a recording as a table of text."""
     rows = [f"{i / rate:.9g},{value:.9g}" for i, value in enumerate(force)]
     return "drop.csv", "\n".join(["time_s,force_N", *rows]).encode()
 
@@ -294,9 +285,7 @@ NAMES = ["../../etc/passwd.wav", "x.exe", "a\0b.wav", "", "x" * 5000]
         (FORM_TYPE, form_body(b"") * 200),
     ],
 )
-def test_requests_that_are_no_forms_get_a_sentence(
-    client: TestClient, kind: str, content: bytes
-) -> None:
+def test_no_form_is_answered_by_a_sentence(client: TestClient, kind: str, content: bytes) -> None:
     response = client.post("/measure", content=content, headers={"Content-Type": kind})
     report = response.json()
     assert report.keys() == {"error", "field"}
@@ -385,24 +374,6 @@ def test_several_files_are_the_drops_of_one_measurement(client: TestClient) -> N
     assert not re.search(r'(src|href)="(?!data:|#)', report)
 
 
-def test_recording_of_a_tyre_has_its_limits(client: TestClient) -> None:
-    octave = measured(client, SOUND, **CALIBRATED, source="tyre")["criteria"][0]
-    assert (octave["lower"], octave["upper"]) == (46, 48)
-
-
-def test_small_files_of_long_records_get_a_sentence(client: TestClient) -> None:
-    # Records of 800 GB and 160 MB.
-    claiming, unpacking = io.BytesIO(), io.BytesIO()
-    with h5py.File(claiming, "w") as file:
-        file.create_dataset("force", (10**11,), "f8", chunks=(2**20,), compression="gzip")
-    scipy.io.savemat(unpacking, {"force": np.zeros(2 * 10**7)}, do_compression=True)
-    for name, content, word in (("a.h5", claiming, "rate"), ("a.mat", unpacking, "MiB")):
-        request = form_of((name, content.getvalue()), unit="N")
-        error = last_report(client, "/measure", **request)["error"]
-        assert error.startswith(name)
-        assert word in error
-
-
 def copies_in(folder: Path) -> list[Path]:
     """Return directories of copies and works; the server of forks has one of its own."""
     return [path for path in folder.iterdir() if not path.name.startswith("pymp-")]
@@ -465,9 +436,7 @@ def status_of(client: TestClient, method: str, address: str, headers: dict[str, 
         *(({**HEAD, "Host": host}, 400) for host in HOSTS),
     ],
 )
-def test_every_route_refuses_strangers(
-    client: TestClient, headers: dict[str, str], expected: int
-) -> None:
+def test_strangers_are_refused(client: TestClient, headers: dict[str, str], expected: int) -> None:
     routes = {r.path: r.methods for r in client.app.routes if isinstance(r, Route)}  # type: ignore[attr-defined]
     assert {"/about", "/solve", "/measure", "/improve", "/fit", "/download/case.nml"} < set(routes)
     # The page itself and its modules hold nothing of a user.
@@ -732,9 +701,7 @@ def leave(application: Any, path: str, *bodies: bytes) -> list[dict[str, Any]]: 
     return sent
 
 
-def test_page_that_leaves_before_the_answer_leaves_no_copy(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_page_that_leaves_leaves_no_copy(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     application = server.new_application({}, token=TOKEN, hosts=("127.0.0.1",), width=1)
     # The second waits for ever where the first has kept its place.
@@ -820,19 +787,3 @@ def test_only_the_loading_branch_is_fitted_and_what_it_does_not_explain_is_said(
     answer = pressed(client, titles, deflection, force**2 / 400)
     assert not answer["is_explained"]
     assert answer["residual"][1] > 0.05
-
-
-EXPORTED = re.compile(r"^export (?:async )?(?:function|const|let|class) +(\w+)", re.MULTILINE)
-IMPORTED = re.compile(r'^import \{([^}]+)\} from "thud/([\w.]+)";$', re.MULTILINE)
-
-
-def test_each_name_that_a_module_of_the_page_imports_exists_and_is_used() -> None:
-    folder = Path(page_file.__file__).parent / "page"
-    texts = {file.name: file.read_text() for file in folder.glob("*.js")}
-    assert "showAll" in EXPORTED.findall(texts["doors.js"])
-    for name, text in texts.items():
-        for listed, module in IMPORTED.findall(text):
-            names = [word.strip() for word in listed.split(",") if word.strip()]
-            assert set(names) <= set(EXPORTED.findall(texts[module])), f"{name} from {module}"
-            unused = [one for one in names if len(re.findall(rf"\b{one}\b", text)) < 2]
-            assert not unused, f"{name}: {unused}"

@@ -27,7 +27,6 @@ SHELL = {"model": {"name": "hollow_sphere"}}
 
 
 async def report_of(jobs: Jobs, values: dict[str, Any] = SHELL) -> dict[str, Any]:
-    """Return the report of a case."""
     (report,) = [report async for report in jobs.run("case", values)]
     return report
 
@@ -52,7 +51,6 @@ def kill_child(pid: int) -> None:
 
 
 async def await_workers(count: int) -> list[int]:
-    """Wait for a number of processes; return them."""
     with anyio.fail_after(60):
         while len(workers()) != count:  # noqa: ASYNC110 - another process is no event
             await anyio.sleep(0.05)
@@ -89,9 +87,7 @@ def test_process_that_stops_while_it_sends_is_ended(monkeypatch: pytest.MonkeyPa
     assert not workers()
 
 
-def test_lost_server_of_forks_is_a_sentence_and_begins_again(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_lost_server_of_forks_is_said_and_begins_again(monkeypatch: pytest.MonkeyPatch) -> None:
     async def lose(jobs: Jobs) -> None:
         forks = vars(forkserver)["_forkserver"]
         with monkeypatch.context() as patch:

@@ -23,7 +23,6 @@ SLOW = {"model": {"name": "finite_element"}, "mesh": {"polar_elements": 600}}
 
 @pytest.fixture
 def server() -> Iterator[Served]:
-    """Return the address of a server, and its process."""
     with serve() as found:
         yield found
 
@@ -45,7 +44,6 @@ def await_end(processes: set[psutil.Process]) -> None:
 
 
 def await_that(condition: Callable[[], bool]) -> None:
-    """Wait until a condition holds."""
     end = time.monotonic() + 20
     while not condition():
         assert time.monotonic() < end
@@ -130,9 +128,7 @@ def test_version_6_of_this_machine_is_served() -> None:
             assert response.headers["X-Content-Type-Options"] == "nosniff"
 
 
-def test_body_of_an_answer_does_not_wait_for_an_acknowledgment(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_body_of_an_answer_waits_for_no_acknowledgment(monkeypatch: pytest.MonkeyPatch) -> None:
     server = pytest.importorskip("thud.explorer.server")
     monkeypatch.setattr("uvicorn.Server.run", lambda _self, sockets: sockets)
     with socket.create_server(("127.0.0.1", 0)) as listener:

@@ -114,9 +114,7 @@ def test_legend_names_forces_that_differ(shell: thud.Impact) -> None:
 
 
 @pytest.mark.parametrize(("bands", "panels"), [("octave", 1), ("third", 2), ("both", 2)])
-def test_third_octaves_are_drawn_where_a_case_asks_for_them(
-    shell: thud.Impact, bands: str, panels: int
-) -> None:
+def test_third_octaves_are_drawn_if_asked_for(shell: thud.Impact, bands: str, panels: int) -> None:
     case = replace(shell.case, levels=thud.Levels(bands=bands))
     figure = plot.levels({"ball": replace(shell, case=case)})
     assert_clean(figure)
@@ -159,9 +157,7 @@ def test_recording_is_drawn_from_first_touch_to_last_release(shell: thud.Impact)
         assert 20 < high < 22
 
 
-def test_files_have_a_title_and_text_of_vector_graphics_is_text(
-    shell: thud.Impact, tmp_path: Path
-) -> None:
+def test_files_have_a_title_and_vector_text_is_text(shell: thud.Impact, tmp_path: Path) -> None:
     for ending in ("svg", "png", "pdf"):
         plot.save(plot.levels({"shell & <ball>": shell}), tmp_path / f"rubber_ball.{ending}")
     assert b"/Title (Rubber ball)" in (tmp_path / "rubber_ball.pdf").read_bytes()
@@ -190,9 +186,7 @@ def test_users_style_changes_no_figure(shell: thud.Impact, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("words", [["run", "case.nml"], ["measure", "record.csv"]])
-def test_commands_without_a_matplotlib_that_works_keep_the_results(
-    words: list[str], tmp_path: Path
-) -> None:
+def test_commands_without_matplotlib_keep_the_results(words: list[str], tmp_path: Path) -> None:
     (tmp_path / "case.nml").write_text(MINIMAL)
     shutil.copy(REPOSITORY / "inputs/recordings/drop_1.csv", tmp_path / "record.csv")
     (tmp_path / "matplotlibrc").write_bytes(b"font.family: \xff")
@@ -222,9 +216,6 @@ def test_every_figure_is_drawn_in_its_own_style() -> None:
     assert [draw.__qualname__ for draw in draws if not hasattr(draw, "__wrapped__")] == []
 
 
-INPUT = REPOSITORY / "inputs"
-
-
 @pytest.mark.parametrize(
     ("command", "results"),
     [
@@ -249,7 +240,7 @@ def test_figure_that_fails_is_a_warning(
 
     monkeypatch.setattr(Figure, "savefig", fail)
     monkeypatch.chdir(tmp_path)
-    assert cli.main([*command.format(INPUT).split(), "-q", "-o", "out"]) == 0
+    assert cli.main([*command.format(REPOSITORY / "inputs").split(), "-q", "-o", "out"]) == 0
     printed = [line for line in capsys.readouterr().err.splitlines() if "not drawn" in line]
     assert printed
     assert all("the font is damaged" in line for line in printed)

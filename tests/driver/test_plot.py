@@ -17,7 +17,6 @@ from thud.plot.style import WIDTH
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from matplotlib.figure import Figure
 
 COARSE: dict[str, Any] = {"radial_elements": 2, "polar_elements": 16}
 SNAPSHOTS = {"snapshot_interval": 1e-3, **COARSE}
@@ -28,18 +27,14 @@ def deformed() -> thud.Impact:
     return thud.solve(model="finite_element", flight_before=2e-3, **SNAPSHOTS)
 
 
-def names(figure: Figure) -> list[str]:
-    (legend,) = figure.legends
-    return [text.get_text() for text in legend.get_texts()]
-
-
 def test_force_history_shows_every_curve_with_units() -> None:
     impacts = {f"{height} m": thud.solve(drop=thud.Drop(height)) for height in (0.1, 1.0, 1.6)}
     figure = thud.plot.force_history(impacts, "elastic")
     (axes,) = figure.axes
     assert axes.get_xlabel() == "Time since first touch, ms"
     assert axes.get_ylabel() == "Elastic force,\nlow-passed at 1.25 kHz, kN"
-    assert names(figure) == list(impacts)
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == list(impacts)
     for line, impact in zip(axes.lines, impacts.values(), strict=True):
         shown = len(line.get_ydata())
         recorded = low_pass(impact.elastic_force, impact.sample_rate)
@@ -56,8 +51,6 @@ def test_levels_show_the_tolerance_band(shell: thud.Impact, source: str) -> None
     boxes = [box.get_datalim(axes.transData).intervaly for box in axes.collections[:5]]
     limits = [(c.lower, c.upper) for c in shell.assess(source).criteria[:5]]
     np.testing.assert_allclose(boxes, limits)
-    curves = {str(line.get_label()): line.get_ydata() for line in axes.lines}
-    np.testing.assert_array_equal(curves["ball"], shell.levels(force="floor"))
 
 
 def test_motion_shows_instants_from_first_touch_to_release(deformed: thud.Impact) -> None:

@@ -18,7 +18,6 @@ BLOCK = re.compile(r"^```([\w{}-]*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 
 
 def without_times(text: str) -> list[str]:
-    """Return the lines of a text, without computing times."""
     return [line for line in text.splitlines() if not line.startswith("computing time")]
 
 
