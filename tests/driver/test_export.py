@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from conftest import REPOSITORY, codes, names_in
-from recording_files import DURATION, PEAK, opened
+from recording_files import PEAK, opened
 from scipy.io import loadmat
 from synthetic import make_recording
 
@@ -28,6 +28,9 @@ soundfile = pytest.importorskip("soundfile", reason="the extra recordings is not
 IMPACT = thud.solve()
 FORCE = blocked_force(IMPACT)
 CASE = str(REPOSITORY / "inputs/rubber_ball_100cm.nml")
+
+# Of the half sine, s.
+DURATION = 0.02
 
 
 def export(*words: str) -> int:

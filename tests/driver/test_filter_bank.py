@@ -89,8 +89,13 @@ def test_each_filter_lies_inside_the_mask_of_class_1(
         # narrows the skirts.
         width = effective_bandwidth(sections, lower, upper, rate)
         assert 0.18 < width < 0.2004
-        what = "effective bandwidth of the filters (IEC 61260-1 class 1)"
-        oracle(what, "standard", width, BANDWIDTH, "dB")
+        oracle(
+            "effective bandwidth of the filters (IEC 61260-1 class 1)",
+            "standard",
+            width,
+            BANDWIDTH,
+            "dB",
+        )
 
 
 @pytest.mark.parametrize("bands", BANDWIDTHS)

@@ -51,8 +51,13 @@ def test_linear_source_has_its_closed_form(
             change = 10 * np.log10(np.vdot(moved, moved).real / np.vdot(blocked, blocked).real)
             # 64 lines in a band, and samples of a force that ends with an edge.
             assert abs(linear.estimate[i, j] - expected) < 3e-3 * abs(expected)
-            what = "mass on a spring on a resistance: change of octaves"
-            oracle(what, "closed form", linear.change[i, j] - change, 2e-3, "dB")
+            oracle(
+                "mass on a spring on a resistance: change of octaves",
+                "closed form",
+                linear.change[i, j] - change,
+                2e-3,
+                "dB",
+            )
 
 
 def test_all_levels_of_a_linear_source_change_alike(linear: thud.BallImpedance) -> None:

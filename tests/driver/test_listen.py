@@ -107,15 +107,21 @@ def test_levels_by_another_instrument_are_those_predicted(
         bands[k] *= 4e-10 * 10 ** (prediction.level[k] / 10) / bands[k].max()
     octaves = level(octave_sums(bands))
     errors = level(octave_sums(library_histories(pressure, 3))) - octaves
-    what = "octaves of the sound below a floor, by PyOctaveBand"
-    oracle(what, "independent code", errors, 0.5, "dB")
+    oracle(
+        "octaves of the sound below a floor, by PyOctaveBand", "independent code", errors, 0.5, "dB"
+    )
     # Filters of octaves also let through some of a louder octave beside theirs.
     above = level(library_histories(pressure, 1)) - octaves
     assert (above > -0.5).all()
     assert (above < 1.6).all()
     fast = fast_history(pyoctaveband.WeightingFilter(RATE, "A").filter(pressure))
-    what = "maximum A-weighted Fast level of the sound below a floor, by PyOctaveBand"
-    oracle(what, "independent code", level(fast) - level(a_weighting(CENTER) @ bands), 0.5, "dB")
+    oracle(
+        "maximum A-weighted Fast level of the sound below a floor, by PyOctaveBand",
+        "independent code",
+        level(fast) - level(a_weighting(CENTER) @ bands),
+        0.5,
+        "dB",
+    )
     # Class 1 filters of thud and of the library differ by their skirts, beside loud bands.
     assert only.reference.third[:n] == pytest.approx(room.level[i, j], abs=0.05)
     assert only.reference.third[n:] == pytest.approx(prediction.level[n:], abs=0.01)
@@ -214,8 +220,13 @@ def test_stated_level_of_a_steep_spectrum_is_that_of_its_own_file(
     weight = np.sqrt(a_weighting(np.fft.rfftfreq(2 * n, 1 / RATE)))
     fast = fast_history(np.fft.irfft(np.fft.rfft(pressure, 2 * n) * weight)[:n])
     (only,) = sound.sounds
-    what = "stated A-weighted level of a sound with modes below 50 Hz"
-    oracle(what, "closed form", level(fast) - only.level.a_weighted, 0.02, "dB")
+    oracle(
+        "stated A-weighted level of a sound with modes below 50 Hz",
+        "closed form",
+        level(fast) - only.level.a_weighted,
+        0.02,
+        "dB",
+    )
     assert only.level.deviation(only.reference) < 0.5
 
 

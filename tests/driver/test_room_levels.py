@@ -40,8 +40,13 @@ def test_published_measurement_is_standardized_and_rated(
     found = thud.read_room_levels(PUBLISHED, volume=41.4)
     printed = [76.3, 57.2, 47.2, 44.8, 38.1, 37.0, 35.3, 30.7, 24.5, 22.2, 16.8, 15.1]
     # Printed to 0.1 dB; its own rounding of the table of g(C) leaves 0.07 dB.
-    what = "standardized levels of a room (Gurtner)"
-    oracle(what, "published measurement", found.standardized - printed, 0.1, "dB")
+    oracle(
+        "standardized levels of a room (Gurtner)",
+        "published measurement",
+        found.standardized - printed,
+        0.1,
+        "dB",
+    )
     assert found.rating.a_weighted == pytest.approx(46.97, abs=0.01)
     assert found.standardized_rating.a_weighted == pytest.approx(46.24, abs=0.01)
     assert (found.rating.rounded, found.standardized_rating.rounded) == (47, 46)
@@ -56,8 +61,13 @@ def test_published_measurement_is_standardized_and_rated(
 
 def test_example_of_iso_717_2_is_rated(oracle: Callable[..., None]) -> None:
     found = thud.rating([65.3, 64.5, 58.0, 55.8])
-    what = "rating of the example of ISO 717-2"
-    oracle(what, "published example", found.a_weighted - 55.3507, 1e-4, "dB")
+    oracle(
+        "rating of the example of ISO 717-2",
+        "published example",
+        found.a_weighted - 55.3507,
+        1e-4,
+        "dB",
+    )
     assert (found.rounded, found.curve, found.korean_class) == (55, 51, 0)
 
 

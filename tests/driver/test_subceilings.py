@@ -112,8 +112,13 @@ def test_radiated_level_has_the_resonance_of_a_mass_on_a_spring(
     follows = (1 + 0.3j) / (1 + 0.3j - (frequency / resonance) ** 2)
     expected = 10 * np.log10((abs(follows) ** 2).mean(axis=1))
     assert expected[0] > 9
-    what = "level below a subceiling − that below the slab, by one mass on a spring"
-    oracle(what, "closed form", found - expected, 1.5, "dB")
+    oracle(
+        "level below a subceiling − that below the slab, by one mass on a spring",
+        "closed form",
+        found - expected,
+        1.5,
+        "dB",
+    )
 
 
 @pytest.mark.parametrize("floor", [HUNG, JOISTS, thud.LaminateFloor(subceiling_thickness=0.0125)])
