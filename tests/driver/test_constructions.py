@@ -36,7 +36,7 @@ def test_file_is_a_floor_whose_values_have_sources(path: Path) -> None:
     entry = thud.construction(path)
     # A name of its own, which states thicknesses in mm and a stiffness.
     assert entry == thud.construction(content["name"]) == thud.constructions()[content["name"]]
-    if thickness := re.match(r"(?:concrete|hollow core|CLT) (\d+)", entry.name):
+    if thickness := re.match(r"(?:concrete|filigree slab|hollow core|CLT) (\d+)", entry.name):
         whole = np.sum(getattr(entry.floor, "layer_thickness", ())) or entry.floor.thickness
         assert whole == pytest.approx(int(thickness[1]) / 1000)
     if layer := re.search(r"screed ?(\d*) on (\d+) MN", entry.name):

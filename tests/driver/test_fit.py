@@ -178,6 +178,8 @@ def test_parameters_are_lost_by_size_and_by_error_of_the_derivatives() -> None:
     def lost(jacobian: np.ndarray, change: np.ndarray, size: float = 1.0) -> int:
         return len(infer(jacobian, jacobian + change, size).null)
 
+    exact = base @ [[2.0, 1.0], [0.0, 3.0]]
+    np.testing.assert_allclose(infer(exact, exact, 1.0).covariance, np.linalg.inv(exact.T @ exact))
     # Less than 1e-9 of the target, or half of it error: no effect.
     none = np.zeros_like(base)
     for length, expected in ((0.99e-9, 1), (1.01e-9, 0)):

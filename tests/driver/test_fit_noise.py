@@ -10,6 +10,7 @@ import pytest
 from conftest import codes, noted, quiet_fit
 from fit_disturbances import DISTURBANCES, QUIET, RATE, TRUTH, pulse
 from scipy import stats
+from scipy.linalg import toeplitz
 
 import thud
 from thud.base.note import Note
@@ -22,6 +23,7 @@ from thud.studies.fitting.record import (
     find_quiet,
     find_tones,
     fit_quiet,
+    grid_covariance,
     log_likelihood,
     on_grid,
     record_noise,
@@ -50,6 +52,17 @@ def pulls(fit: thud.Fit) -> NDArray[np.float64]:
 def to_grid(samples: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     """Return columns of samples on a grid of `count` points."""
     return on_grid(np.fft.rfft(samples, norm="ortho", axis=0)[: count // 2 + 1])
+
+
+@pytest.mark.parametrize("kind", [0, 1, 2])
+def test_covariance_on_the_grid_is_that_of_samples(kind: int) -> None:
+    # The closed form of the double sum over samples against that sum.
+    time = np.arange(300) / RATE
+    samples = time, time + 1 / RATE
+    row = unit_covariances((time[:1], time[:1] + 1 / RATE), samples)[kind, 0]
+    dense = to_grid(to_grid(toeplitz(row), 41).T, 41)
+    found = grid_covariance(row, 41)
+    np.testing.assert_allclose(found, dense, atol=1e-12 * np.abs(dense).max())
 
 
 @pytest.mark.parametrize("given", [None, 2.0])
@@ -225,6 +238,7 @@ def test_offset_and_tone_are_part_of_the_noise() -> None:
     # Its frequency is found to 0.2 Hz.
     assert note.others["frequency"] == pytest.approx(16.7, abs=FAR * 0.2)
     assert note.value == pytest.approx(10.0, abs=2.0)
+    assert np.std(fit.columns()["background_N"]) == pytest.approx(10 / np.sqrt(2), rel=0.2)
     # Hum of the mains is noted.
     note = noted(thud.fit(record("hum of 60 Hz, 3 N"), TRUTH, CASE).notes, "hum_removed")
     assert note.others["frequency"] == 60

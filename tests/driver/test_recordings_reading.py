@@ -476,7 +476,8 @@ KINDS: dict[type, dict[str, Any]] = {
 }
 SCALARS = st.booleans() | st.integers(-2, 10**6) | st.floats() | st.text() | st.dates()
 LISTS = st.lists(SCALARS | st.lists(SCALARS, max_size=3), max_size=3)
-ANY_VALUE = SCALARS | LISTS | st.dictionaries(st.text(), SCALARS | LISTS, max_size=2)
+STRANGE = st.sampled_from([object(), 1j, b"x", np.array([1.0, 2.0])])
+ANY_VALUE = STRANGE | SCALARS | LISTS | st.dictionaries(st.text(), SCALARS | LISTS, max_size=2)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -42,6 +42,15 @@ def rows_of(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
+def test_results_are_kept_where_no_set_has_any(run: Run, case: Path, tmp_path: Path) -> None:
+    (tmp_path / "table.csv").write_text("height\n1\n0.5\n")
+    assert run(case, "--samples", "table.csv", "-o", "out", "-q").returncode == 0
+    before = (tmp_path / "out/samples.csv").read_bytes()
+    case.write_text(CASE.replace("2.45", "-1"))
+    assert run(case, "--samples", "table.csv", "-o", "out", "-q").returncode == 1
+    assert (tmp_path / "out/samples.csv").read_bytes() == before
+
+
 def test_rows_are_those_of_solve_many(run: Run, case: Path, tmp_path: Path) -> None:
     heights = np.random.default_rng(1).uniform(0.5, 1.5, 40)
     flux = np.resize(["momentum_balance", "retarding", "conservative", "none"], 40)

@@ -209,6 +209,7 @@ def test_progress_is_shown_on_a_terminal_only(
     assert re.search(r"\r100%\|.*\| 4/4 \[\d\d:\d\d<\d\d:\d\d, .*sample.*\]", printed)
     assert cli.main(["sweep", "--no-figures", "--replace", "s.toml"]) == 0
     assert capsys.readouterr().err == "s: 4 samples of modal_ball\n"
+    assert (tmp_path / "outputs/s/s.nc").exists()
 
 
 def test_paths_stay_whole(capsys: pytest.CaptureFixture[str], case_file: CaseFile) -> None:

@@ -54,6 +54,7 @@ def test_folders_use_those_before_them() -> None:
         and place[path.split("/")[0]] <= place[used.split("/")[0]]
     }
     assert not wrong
+    assert fortran_uses(SOURCES)["base/text.f90"]
 
 
 def test_modules_are_named_after_their_files() -> None:

@@ -7,6 +7,7 @@ import itertools
 import os
 import re
 import resource
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -268,11 +269,16 @@ def test_design_that_exceeds_the_memory_is_told(tmp_path: Path) -> None:
 
 def test_values_by_names_of_keys_are_a_grid() -> None:
     height = thud.Parameter(low=50, high=100, count=2, unit="cm")
-    found = thud.sweep({"height": height, "mass": [2.4, 2.6]}, case=SHELL)
     masses = {"values": np.array([2.4, 2.6])}
-    fixed = {"model": "hollow_sphere", "substeps": np.int64(SHELL.sampling.substeps)}
+    fixed = {"model": "hollow_sphere", "substeps": np.int64(2)}
     table = {"fixed": fixed, "parameters": {"height": height, "mass": masses}}
-    assert found.dataset.drop_attrs().identical(thud.sweep(table).dataset.drop_attrs())
+    masses = {"values": [2.4, 2.6]}
+    plain = {"fixed": fixed | {"substeps": 2}, "parameters": {"height": height, "mass": masses}}
+    of_table = thud.sweep(table)
+    assert of_table.dataset.identity == thud.sweep(plain).dataset.identity
+    same = replace(SHELL, sampling=replace(SHELL.sampling, substeps=2))
+    found = thud.sweep({"height": height, "mass": [2.4, 2.6]}, case=same)
+    assert found.dataset.drop_attrs().identical(of_table.dataset.drop_attrs())
     frame = found.to_dataframe()
     assert frame.loc[0.5, 2.6]["floor_octave_63"] == found.dataset["floor_octave"].values[0, 1, 1]
     # Scalars, ranges and columns are arrays, as for `solve_many`.
