@@ -198,6 +198,7 @@ def test_temperatures_and_calibrations_are_shown() -> None:
     assert {"calibration", "warning limits (2 σ)", "action limits (3 σ)"} <= set(labels)
     panel = next(axes for axes in figure.axes if axes.get_ylabel().startswith("Temperature"))
     np.testing.assert_array_equal(panel.lines[0].get_ydata(), [19, 20, 21, 22, 23])
+    assert panel.xaxis.get_tick_params()["labelbottom"]
     level = next(axes for axes in figure.axes if axes.get_ylabel().startswith("63 Hz"))
     limits = found.series[1].control
     assert limits is not None

@@ -220,9 +220,9 @@ def test_paths_stay_whole(capsys: pytest.CaptureFixture[str], case_file: CaseFil
 
 
 def test_sentences_are_wrapped_between_words() -> None:
-    text = f"{'a' * 40} {'b' * 40}\n# {'c' * 70} {'d' * 20}\n{'e' * 100} f"
+    text = f"{'a' * 40} {'b' * 40}\n# {'c' * 70} {'d-' * 9}d\n{'e' * 100} f"
     assert wrap(text).split("\n") == [
-        "a" * 40, f"  {'b' * 40}", f"# {'c' * 70}", f"#   {'d' * 20}", "e" * 100, "  f",
+        "a" * 40, f"  {'b' * 40}", f"# {'c' * 70}", f"#   {'d-' * 9}d", "e" * 100, "  f",
     ]  # fmt: skip
 
 
