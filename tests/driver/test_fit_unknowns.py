@@ -107,6 +107,8 @@ def test_misfit_is_that_of_the_worst_band() -> None:
     # Its power is that of a quarter of the frequencies.
     assert misfit_ratio(noise + tone) == pytest.approx(np.sqrt(4 * 100 / 2), rel=0.05)
     assert misfit_ratio(0.1 * noise) == 1
+    # An offset is in none of the bands.
+    assert misfit_ratio(np.full(400, 3.0)) == pytest.approx(3)
 
 
 def test_effect_of_calibration_is_stated() -> None:
