@@ -138,6 +138,8 @@ def test_polarity_is_doubted_from_half_as_much_again_on(opposite: float, is_doub
     force = np.concatenate([FORCE / 1.5, -opposite * FORCE])
     signal = orient(Signal.from_array(force, RATE), "positive")
     assert codes(signal.notes) == ["polarity_doubtful"] * is_doubted
+    for note in signal.notes:
+        assert note.others["opposite"] == pytest.approx(-opposite * PEAK)
 
 
 def test_unusual_peaks_and_what_replaces_a_header_are_noted() -> None:

@@ -42,6 +42,7 @@ from thud.recordings.calibration import calibrate
 from thud.recordings.config import Config, read_config, to_channels
 from thud.recordings.force_units import Calibration, newtons_per_unit
 from thud.recordings.formats.text import read_table
+from thud.recordings.instruments import Plate
 from thud.recordings.plate_tap import calibrate_tap
 from thud.recordings.signal import Signal, add_signals, orient
 from thud.studies.fitting.record import time_and_force
@@ -53,8 +54,9 @@ if TYPE_CHECKING:
 
 # What is only imported for the table.
 __all__ = [
-    "DROOPED", "STEADY", "Calibration", "add_signals", "h5py", "high_pass", "newtons_per_unit",
-    "noisy", "orient", "os", "patch", "pulse", "recording_file", "steps", "struct", "to_channels",
+    "DROOPED", "STEADY", "Calibration", "Plate", "add_signals", "h5py", "high_pass",
+    "newtons_per_unit", "noisy", "orient", "os", "patch", "pulse", "recording_file", "steps",
+    "struct", "to_channels",
     "weighed", "weight",
 ]  # fmt: skip
 
