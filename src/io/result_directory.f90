@@ -9,8 +9,8 @@ module thud_result_directory
    use, intrinsic :: iso_c_binding, only: c_null_char
    use thud_error, only: error_type, input_error
    use thud_interrupt, only: check_interrupt
-   use thud_system, only: append_text, get_real_path, get_system_message, list_directory, make_directory, name_length, &
-      path_length, read_text_file, remove_file, swap_directories
+   use thud_system, only: append_text, get_real_path, get_size, get_system_message, is_directory, is_missing, &
+      list_directory, make_directory, name_length, path_length, read_text_file, remove_file, swap_directories
    use thud_text, only: newline, split, to_text
    implicit none (type, external)
    private
@@ -58,7 +58,7 @@ contains
       integer :: i, j, status
 
       path = trim(get_real_path(self%path))
-      inquire (file=path, exist=exists)
+      exists = get_size(path) /= is_missing
       call list_directory(path, old_names, status)
       if (exists .and. status < 0) then
          error = input_error(self%path//' is not a directory that can be read; allowed: a directory')
@@ -81,7 +81,7 @@ contains
       end do
       do i = 1, size(old_names)
          file = '/'//trim(old_names(i))
-         inquire (file=path//file//'/.', exist=exists)
+         exists = get_size(path//file) == is_directory
          if (any([(get_real_path(trim(self%inputs(j))) == path//file, j=1, size(self%inputs))])) then
             error = input_error(self%path//file//' is an input, which is never replaced; allowed: another directory')
          else if (exists .or. all(expected /= old_names(i))) then
@@ -126,8 +126,7 @@ contains
       status = 0
       do i = 2, len(target)
          if (target(i:i) /= '/' .or. status > 0) cycle
-         inquire (file=target(:i)//'.', exist=exists)
-         if (.not. exists) status = make_directory(target(:i - 1)//c_null_char)
+         if (get_size(target(:i - 1)) /= is_directory) status = make_directory(target(:i - 1)//c_null_char)
       end do
       ! The parents may have been missing before.
       target = trim(get_real_path(self%path))

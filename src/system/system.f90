@@ -1,15 +1,16 @@
-!> Files, directories and terminals, with the calls of the operating system that Fortran lacks (`system.c`). Status codes are
-!> 0 or the number of the system's error.
+!> Files, directories and terminals, with the calls of the operating system that Fortran lacks (`system_posix.c`,
+!> `system_windows.c`). Status codes are 0 or the number of the system's error.
 module thud_system
-   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char, c_size_t
+   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_long_long, c_null_char, c_size_t
    use, intrinsic :: iso_fortran_env, only: int64
    use thud_error, only: error_type, input_error
    use thud_text, only: byte_order_mark, split, to_text
    implicit none (type, external)
    private
 
-   public :: append_text, get_real_path, get_system_message, is_terminal, list_directory, make_directory, read_text_file
-   public :: remove_file, standard_error, standard_output, swap_directories, write_text
+   public :: append_text, get_native_path, get_real_path, get_size, get_system_message, is_terminal
+   public :: list_directory, make_directory, read_text_file, remove_file, standard_error, standard_output
+   public :: swap_directories, write_text
 
    !> Standard descriptors of the process.
    integer, parameter :: standard_output = 1, standard_error = 2
@@ -19,6 +20,9 @@ module thud_system
 
    !> Maximum length of all names in a directory.
    integer, parameter :: list_length = 1048576
+
+   !> Sizes of what is no file.
+   integer(int64), parameter, public :: is_missing = -1_int64, is_directory = -2_int64
 
    !> Maximum size of an input file, bytes.
    integer(int64), parameter :: max_input_size = 65536_int64
@@ -51,12 +55,16 @@ module thud_system
    !> Makes a directory; all paths end with a zero. Negative if the path exists.
    procedure(path_call), bind(c, name='thud_make_directory') :: make_directory
    !> Removes a file or an empty directory.
-   procedure(path_call), bind(c, name='remove') :: remove_file
+   procedure(path_call), bind(c, name='thud_remove') :: remove_file
    !> Puts a directory in the place of another one, a path without links, which then has the path of the first. Negative if
    !> the other one was missing or empty: the first path is then free, also for another process.
    procedure(two_path_call), bind(c, name='thud_swap') :: swap_directories
    procedure(reading_call), bind(c, name='thud_list') :: c_list
    procedure(reading_call), bind(c, name='thud_get_real_path') :: c_get_real_path
+   procedure(reading_call), bind(c, name='thud_get_native_path') :: c_get_native_path
+
+   !> Separates the names of a path beside the slash, which all systems know; a slash if there is no other.
+   character(kind=c_char), protected, public, bind(c, name='thud_separator') :: separator
 
    interface
       function c_isatty(descriptor) bind(c, name='isatty') result(yes)
@@ -65,6 +73,13 @@ module thud_system
          integer(c_int), value :: descriptor
          integer(c_int) :: yes
       end function c_isatty
+
+      function c_get_size(path) bind(c, name='thud_get_size') result(bytes)
+         import :: c_char, c_long_long
+         implicit none (type, external)
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_long_long) :: bytes
+      end function c_get_size
 
       subroutine c_get_error_text(number, text, length) bind(c, name='thud_get_error_text')
          import :: c_char, c_int, c_size_t
@@ -135,10 +150,10 @@ contains
       character(len=128) :: reason
       integer :: unit, status
 
-      inquire (file=path, size=bytes)
+      bytes = get_size(path)
       allocate (character(len=min(max(bytes, 0_int64), max_input_size)) :: text)
       status = 1
-      if (bytes < 0) then
+      if (bytes == is_missing) then
          reason = 'there is no such file'
       else if (bytes > max_input_size .or. bytes < 1) then
          ! Pipes and devices have no size; opening one could block.
@@ -146,7 +161,8 @@ contains
       else
          ! Threads may read the same file, and none can be open twice.
          !$omp critical (thud_read_text_file)
-         open (newunit=unit, file=path, action='read', access='stream', status='old', iostat=status, iomsg=reason)
+         open (newunit=unit, file=get_native_path(path), action='read', access='stream', status='old', iostat=status, &
+            iomsg=reason)
          if (status == 0) then
             read (unit, iostat=status, iomsg=reason) text
             close (unit)
@@ -158,6 +174,24 @@ contains
          //to_text(int(max_input_size))//' bytes')
       if (index(text, byte_order_mark) == 1) text = text(len(byte_order_mark) + 1:)
    end subroutine read_text_file
+
+   !> Size of a regular file, bytes, 0 of pipes and devices; `is_missing` or `is_directory` of what is none.
+   function get_size(path) result(bytes)
+      character(len=*), intent(in) :: path
+      integer(int64) :: bytes
+
+      bytes = int(c_get_size(path//c_null_char), int64)
+   end function get_size
+
+   !> A path as Fortran opens it.
+   function get_native_path(path) result(native)
+      character(len=*), intent(in) :: path
+      character(len=path_length) :: native
+
+      native = path
+      if (c_get_native_path(path//c_null_char, native, len(native, c_size_t)) /= 0) return
+      native = native(:index(native, c_null_char) - 1)
+   end function get_native_path
 
    !> A path without links; of a missing file or directory the path itself.
    function get_real_path(path) result(real_path)

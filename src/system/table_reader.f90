@@ -5,6 +5,7 @@ module thud_table_reader
    use, intrinsic :: iso_fortran_env, only: iostat_end
    use thud_error, only: error_type, input_error
    use thud_kinds, only: wp
+   use thud_system, only: get_native_path, get_size, is_directory
    use thud_text, only: byte_order_mark, is_number, newline, quoted, replaced, tab, to_text
    implicit none (type, external)
    private
@@ -41,14 +42,12 @@ contains
       !> Set if the file cannot be read; no message of a table names its path.
       type(error_type), allocatable, intent(out) :: error
       character(len=128) :: reason
-      logical :: is_directory
       integer :: status
 
-      inquire (file=path//'/.', exist=is_directory)
       status = 1
       reason = 'it is a directory'
-      if (.not. is_directory) open (newunit=table%unit, file=path, action='read', access='stream', form='formatted', &
-         status='old', iostat=status, iomsg=reason)
+      if (get_size(path) /= is_directory) open (newunit=table%unit, file=get_native_path(path), action='read', &
+         access='stream', form='formatted', status='old', iostat=status, iomsg=reason)
       if (status == 0) return
       table%unit = 0
       error = input_error('the file cannot be read ('//trim(reason)//'); allowed: a table')

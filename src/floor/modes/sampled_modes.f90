@@ -13,6 +13,7 @@ module thud_sampled_modes
    use thud_function_set, only: min_nodes, new_splines
    use thud_kinds, only: wp
    use thud_modes, only: shape_type
+   use thud_system, only: get_size
    use thud_table_reader, only: cell_length, open_table, read_number, read_row, row_error, table_reader_type
    use thud_text, only: fixed, lower_case, quoted, to_text
    implicit none (type, external)
@@ -53,7 +54,7 @@ contains
       integer(int64) :: bytes
 
       ! Pipes and devices have no size; opening one could block.
-      inquire (file=path, size=bytes)
+      bytes = get_size(path)
       if (bytes < 1 .or. bytes > max_size) then
          error = input_error('there is no such file, or it is empty, a directory, not regular or too large; allowed: a ' &
             //'table of modes of up to '//to_text(int(max_size))//' bytes')

@@ -1,12 +1,12 @@
 !> Cases as namelist files: reading, writing, and the description of all keys.
 module thud_case_text
-   use, intrinsic :: iso_fortran_env, only: int64
    use thud_case, only: case_type, check_case, check_name, get_active_fields, get_fields, get_full_key, is_stated, &
       is_used, new_case, set_floor_air, set_standard_modulus
    use thud_error, only: error_type, input_error
    use thud_field, only: check_fields, field_type, name_length
    use thud_namelist_text, only: assignment_type, parse_namelist
    use thud_registry, only: floor_names
+   use thud_system, only: get_size
    use thud_text, only: get_suggestion, join_quoted, newline, quoted, shortened, to_text
    implicit none (type, external)
    private
@@ -88,7 +88,6 @@ contains
       character(len=*), intent(in) :: directory
       !> Set if a path is too long.
       type(error_type), allocatable, intent(out) :: error
-      integer(int64) :: bytes
       integer :: i
 
       do i = 1, size(fields)
@@ -96,8 +95,7 @@ contains
          select type (path => fields(i)%value)
          type is (character(len=*))
             if (path == '' .or. path(1:1) == '/') cycle
-            inquire (file=directory//trim(path), size=bytes)
-            if (bytes >= 0) call fields(i)%set_from_text(quoted(directory//trim(path)), error)
+            if (get_size(directory//trim(path)) >= 0) call fields(i)%set_from_text(quoted(directory//trim(path)), error)
          end select
          if (allocated(error)) return
       end do

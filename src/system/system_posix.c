@@ -127,6 +127,30 @@ int thud_write(const char *path, int descriptor, const char *bytes, size_t lengt
    return error == EPIPE || error == EBADF ? 0 : error;
 }
 
+// Separates the names of a path beside the slash; a slash if there is no other.
+const char thud_separator = '/';
+
+// Removes a file or an empty directory.
+int thud_remove(const char *path)
+{
+   return remove(path) == 0 ? 0 : errno;
+}
+
+// Size of a regular file, 0 of pipes and devices; -1 if nothing has the path, -2 of a directory.
+long long thud_get_size(const char *path)
+{
+   struct stat found;
+
+   if (stat(path, &found) != 0) return -1;
+   return S_ISDIR(found.st_mode) ? -2 : found.st_size;
+}
+
+// Path as the C library takes it, at most `length` bytes including the final zero.
+int thud_get_native_path(const char *path, char *text, size_t length)
+{
+   return (size_t)snprintf(text, length, "%s", path) < length ? 0 : ENAMETOOLONG;
+}
+
 // Makes a directory; -EEXIST if the path exists.
 int thud_make_directory(const char *path)
 {
