@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import os
-import resource
 import signal
+import sys
 import tempfile
 import threading
 from contextlib import suppress
-from multiprocessing import forkserver, get_context, parent_process
+from multiprocessing import get_context, parent_process
 from typing import TYPE_CHECKING, Any
 
 import anyio
@@ -25,7 +25,8 @@ from thud.explorer.recording import answer_recording, calibration_report
 if TYPE_CHECKING:
     from collections.abc import AsyncGenerator, Callable
     from multiprocessing.connection import Connection
-    from multiprocessing.context import ForkServerProcess
+    from multiprocessing.context import ForkServerContext, SpawnContext
+    from multiprocessing.process import BaseProcess
 
     Report = dict[str, Any]
 
@@ -58,13 +59,10 @@ class Jobs:
         time_limit
             Maximum duration of a task, s.
         """
-        # The fork server has loaded the modules, so that new processes start immediately.
-        self._context = get_context("forkserver")
-        self._context.set_forkserver_preload([__name__])
-        forkserver.ensure_running()
+        self._context = _new_context()
         self._slots = anyio.Semaphore(width)
         self._time_limit = time_limit
-        self._idle: list[tuple[ForkServerProcess, Connection]] = []
+        self._idle: list[tuple[BaseProcess, Connection]] = []
 
     async def run(self, task: str, *arguments: object) -> AsyncGenerator[Report, None]:
         """Yield the report of a task: ``{"answer": …}`` or ``{"error": message}``.
@@ -100,7 +98,7 @@ class Jobs:
         # The slot is released before this report, as the caller may read it slowly.
         yield report
 
-    def _take(self) -> tuple[ForkServerProcess, Connection, Connection | None]:
+    def _take(self) -> tuple[BaseProcess, Connection, Connection | None]:
         """Return a process, its connection, and the child's end if the process is new."""
         while self._idle:
             process, connection = self._idle.pop()
@@ -113,6 +111,19 @@ class Jobs:
         return process, connection, child_end
 
 
+def _new_context() -> ForkServerContext | SpawnContext:
+    """Return how processes are started."""
+    if sys.platform == "win32":
+        return get_context("spawn")
+    from multiprocessing import forkserver  # Windows has none.
+
+    # The fork server has loaded the modules, so that new processes start immediately.
+    context = get_context("forkserver")
+    context.set_forkserver_preload([__name__])
+    forkserver.ensure_running()
+    return context
+
+
 def _exchange(connection: Connection, request: object) -> Report:
     """Send a request to a process; return its report."""
     connection.send(request)
@@ -120,7 +131,7 @@ def _exchange(connection: Connection, request: object) -> Report:
     return report
 
 
-def _kill(process: ForkServerProcess) -> None:
+def _kill(process: BaseProcess) -> None:
     if process.pid is not None:
         process.kill()
         process.join()
@@ -133,7 +144,10 @@ def _run_tasks(connection: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # The default lock is a semaphore of the system, which would outlive a killed process.
     tqdm.set_lock(threading.RLock())
-    resource.setrlimit(resource.RLIMIT_AS, (MAX_MEMORY, MAX_MEMORY))
+    if sys.platform != "win32":
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (MAX_MEMORY, MAX_MEMORY))
     with suppress(EOFError, OSError):
         while True:
             folder, task, arguments = connection.recv()

@@ -174,6 +174,12 @@ class Ensemble(SampleQuantities, Displayed):
         return sample_table(self.to_xarray())
 
 
+def usable_threads() -> int:
+    """Return how many threads this process may use; Windows states all processors."""
+    own = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    return min(own or 1, MAX_THREADS)
+
+
 def solve_many(  # noqa: PLR0913 - samples, and how to compute them
     parameters: Mapping[str, ArrayLike] | pd.DataFrame,
     case: Case | None = None,
@@ -241,7 +247,7 @@ def solve_many(  # noqa: PLR0913 - samples, and how to compute them
     content = case_text(base)
     if not hasattr(parameters, "keys"):
         refuse_value("parameters", parameters, "arrays by their keys")
-    n_thread = min(len(os.sched_getaffinity(0)), MAX_THREADS) if threads is None else threads
+    n_thread = usable_threads() if threads is None else threads
     require_whole("threads", n_thread, 1, MAX_THREADS)
     length = math.ceil(base.sampling.duration * base.sampling.sample_rate) if forces else 0
     try:

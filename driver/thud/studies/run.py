@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from itertools import islice
@@ -15,7 +14,7 @@ from thud.base.bridge import api, version
 from thud.base.checks import refuse, refuse_unknown, require_kind, require_whole, shown
 from thud.base.errors import InputError, NumericalError, ThudError
 from thud.base.files import replace_file
-from thud.impact.ensemble import MAX_THREADS, solve_many
+from thud.impact.ensemble import MAX_THREADS, solve_many, usable_threads
 from thud.studies.dataset import (
     join_blocks,
     new_dataset,
@@ -29,6 +28,7 @@ from thud.studies.kinds import KINDS
 from thud.studies.study import read_study, with_surrogate
 
 if TYPE_CHECKING:
+    import os
     from collections.abc import Iterable, Iterator
 
     import xarray as xr
@@ -190,7 +190,7 @@ def _executor(options: RunOptions) -> Iterator[tuple[Executor, int]]:
         return
     if workers is not None:
         require_whole("workers", workers, 1, MAX_THREADS)
-    width = workers or min(len(os.sched_getaffinity(0)), MAX_THREADS)
+    width = workers or usable_threads()
     with ThreadPoolExecutor(width) as threads:
         try:
             yield threads, 2 * width
