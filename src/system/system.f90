@@ -155,6 +155,8 @@ contains
       status = 1
       if (bytes == is_missing) then
          reason = 'there is no such file'
+      else if (bytes == is_directory) then
+         reason = 'it is a directory'
       else if (bytes > max_input_size .or. bytes < 1) then
          ! Pipes and devices have no size; opening one could block.
          reason = 'the file is empty, too large or not a regular file'
