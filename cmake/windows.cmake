@@ -1,5 +1,5 @@
-# Toolchain: builds for Windows on Debian with its cross compilers and the libraries in THUD_WINDOWS_LIBRARIES, which
-# `./bootstrap windows` brings.
+# Toolchain: builds for Windows on Debian with its cross compilers. THUD_WINDOWS_LIBRARIES has OpenBLAS and FFTW for Windows
+# in lib, and the Fortran interface of FFTW in include.
 set(CMAKE_SYSTEM_NAME Windows)
 set(CMAKE_SYSTEM_PROCESSOR AMD64)
 # Of the two kinds of threads of this compiler, OpenMP has those of POSIX.
