@@ -1,4 +1,4 @@
-!> Interrupts and other states of the process, kept by the system's part in C; long loops check for an interrupt.
+!> Interrupts and other states of the process, kept by `system.c`; long loops check for an interrupt.
 module thud_interrupt
    use, intrinsic :: iso_c_binding, only: c_int
    use thud_error, only: error_type, signal_base

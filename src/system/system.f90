@@ -1,5 +1,5 @@
-!> Files, directories and terminals, with the calls of the operating system that Fortran lacks (`system_posix.c`,
-!> `system_windows.c`). Status codes are 0 or the number of the system's error.
+!> Files, directories and terminals, with the calls of the operating system that Fortran lacks (`system.c`). Status codes are
+!> 0 or the number of the system's error.
 module thud_system
    use, intrinsic :: iso_c_binding, only: c_char, c_int, c_long_long, c_null_char, c_size_t
    use, intrinsic :: iso_fortran_env, only: int64

@@ -1,5 +1,5 @@
 // Operating system calls that Fortran lacks, with the system's own headers.
-// Functions return 0, or the number of the error, unless stated otherwise.
+// Paths are UTF-8. Functions return 0, or the number of the error, unless stated otherwise.
 #define _GNU_SOURCE
 #include <dirent.h>
 #include <errno.h>
@@ -13,6 +13,43 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#ifdef _WIN32
+#include <windows.h>
+#include <wchar.h>
+
+// Longest path.
+#define LONGEST 4096
+
+// A path in UTF-16, which the C library of Windows needs for all that is no ASCII.
+static const wchar_t *to_wide(const char *path, wchar_t text[LONGEST])
+{
+   if (!MultiByteToWideChar(CP_UTF8, MB_ERR_INVALID_CHARS, path, -1, text, LONGEST)) wcscpy(text, L"?");
+   return text;
+}
+
+static const char *to_utf8(const wchar_t *path, char text[LONGEST])
+{
+   if (!WideCharToMultiByte(CP_UTF8, 0, path, -1, text, LONGEST, NULL, NULL)) strcpy(text, "?");
+   return text;
+}
+
+#define WIDE(path) to_wide(path, (wchar_t[LONGEST]){0})
+#define NAME_OF(entry) to_utf8(entry->d_name, (char[LONGEST]){0})
+#define OPEN(path) _wopen(WIDE(path), O_WRONLY | O_CREAT | O_APPEND | O_BINARY | O_NOINHERIT, 0666)
+#define DIR _WDIR
+#define dirent _wdirent
+#define opendir(path) _wopendir(WIDE(path))
+#define readdir(directory) _wreaddir(directory)
+#define closedir(directory) _wclosedir(directory)
+#define mkdir(path, mode) _wmkdir(WIDE(path))
+#define remove(path) (_wremove(WIDE(path)) == 0 ? 0 : _wrmdir(WIDE(path)))
+#define rename(path, target) _wrename(WIDE(path), WIDE(target))
+#else
+#define LONGEST PATH_MAX
+#define NAME_OF(entry) entry->d_name
+#define OPEN(path) open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666)
+#endif
+
 // Number of the signal that asks to end the work, 0 for none; long loops check it through the module thud_interrupt.
 volatile sig_atomic_t thud_latest_signal = 0;
 
@@ -20,9 +57,55 @@ volatile sig_atomic_t thud_latest_signal = 0;
 // for.
 volatile sig_atomic_t thud_is_forked = 0;
 
-// The process that called last, 0 for none, and its number of running calls.
-static _Atomic pid_t caller = 0;
+// Number of running calls.
 static atomic_int running = 0;
+
+// Interrupts the running calls.
+void thud_interrupt_calls(void)
+{
+   if (running > 0) thud_latest_signal = SIGINT;
+}
+
+// Marks the end of a call.
+void thud_end_call(void)
+{
+   if (--running == 0) thud_latest_signal = 0;
+}
+
+#ifdef _WIN32
+static int is_executable = 0;
+
+// Windows calls this in a thread of its own: of the library first, then of what hosts it, such as Python. The executable
+// ends at the third request.
+static BOOL WINAPI record_event(DWORD event)
+{
+   static atomic_int count = 0;
+
+   (void)event;
+   if (running > 0) thud_latest_signal = SIGINT;
+   if (is_executable && ++count == 3) ExitProcess(128 + SIGINT);
+   return is_executable;
+}
+
+void thud_begin_call(void)
+{
+   static atomic_flag hooked = ATOMIC_FLAG_INIT;
+
+   running++;
+   if (!atomic_flag_test_and_set(&hooked)) SetConsoleCtrlHandler(record_event, TRUE);
+}
+
+// The screen takes UTF-8, and line feeds as they are.
+void thud_prepare_process(void)
+{
+   is_executable = 1;
+   SetConsoleOutputCP(CP_UTF8);
+   for (int i = 1; i <= STDERR_FILENO; i++) _setmode(i, O_BINARY);
+   thud_begin_call();
+}
+#else
+// The process that called last, 0 for none.
+static _Atomic pid_t caller = 0;
 
 // Handlers of the process, which `record_signal` calls too.
 static const int ending_signals[] = {SIGINT, SIGTERM};
@@ -64,18 +147,6 @@ void thud_begin_call(void)
    atomic_flag_clear(&hooking);
 }
 
-// Interrupts the running calls.
-void thud_interrupt_calls(void)
-{
-   if (running > 0) thud_latest_signal = SIGINT;
-}
-
-// Marks the end of a call.
-void thud_end_call(void)
-{
-   if (--running == 0) thud_latest_signal = 0;
-}
-
 // Handler of the executable: some callers send a signal both to the process and to its group.
 static void end_at_third(int number)
 {
@@ -101,6 +172,7 @@ void thud_prepare_process(void)
    }
    thud_begin_call();
 }
+#endif
 
 // Message of an error, at most `length` bytes including the final zero.
 void thud_get_error_text(int number, char *text, size_t length)
@@ -112,11 +184,11 @@ void thud_get_error_text(int number, char *text, size_t length)
 // stream has no reader: no error.
 int thud_write(const char *path, int descriptor, const char *bytes, size_t length)
 {
-   int file = *path ? open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666) : descriptor;
+   int file = *path ? OPEN(path) : descriptor;
    int error = file < 0 ? errno : 0;
 
    while (length > 0 && !error) {
-      ssize_t count = write(file, bytes, length);
+      ssize_t count = write(file, bytes, length < INT_MAX ? (unsigned)length : INT_MAX);
 
       if (count < 0 && errno != EINTR) error = errno;
       bytes += count > 0 ? count : 0;
@@ -128,7 +200,11 @@ int thud_write(const char *path, int descriptor, const char *bytes, size_t lengt
 }
 
 // Separates the names of a path beside the slash; a slash if there is no other.
+#ifdef _WIN32
+const char thud_separator = '\\';
+#else
 const char thud_separator = '/';
+#endif
 
 // Removes a file or an empty directory.
 int thud_remove(const char *path)
@@ -139,15 +215,24 @@ int thud_remove(const char *path)
 // Size of a regular file, 0 of pipes and devices; -1 if nothing has the path, -2 of a directory.
 long long thud_get_size(const char *path)
 {
+#ifdef _WIN32
+   struct _stat64 found;
+   int error = _wstat64(WIDE(path), &found);
+#else
    struct stat found;
+   int error = stat(path, &found);
+#endif
 
-   if (stat(path, &found) != 0) return -1;
+   if (error != 0) return -1;
    return S_ISDIR(found.st_mode) ? -2 : found.st_size;
 }
 
-// Path as the C library takes it, at most `length` bytes including the final zero.
+// Path as Fortran opens it, in the code page of the process on Windows; at most `length` bytes including the final zero.
 int thud_get_native_path(const char *path, char *text, size_t length)
 {
+#ifdef _WIN32
+   if (WideCharToMultiByte(CP_ACP, 0, WIDE(path), -1, text, (int)length, NULL, NULL)) return 0;
+#endif
    return (size_t)snprintf(text, length, "%s", path) < length ? 0 : ENAMETOOLONG;
 }
 
@@ -157,18 +242,24 @@ int thud_make_directory(const char *path)
    return mkdir(path, 0777) == 0 ? 0 : errno == EEXIST ? -EEXIST : errno;
 }
 
-// Puts a directory in the place of another one, which then has its path, in one step if the file system can exchange names;
-// else the other one is `NAME.old` for a moment. -1 if it was missing or empty: nothing of the caller has the path then.
+// Puts a directory in the place of another one, which then has its path, in one step if the system can exchange names; else
+// the other one is `NAME.old` for a moment. -1 if it was missing or empty: nothing of the caller has the path then.
 int thud_swap(const char *path, const char *target)
 {
-   char old[PATH_MAX];
-   struct stat there;
+   char old[LONGEST];
    int error;
+#ifndef _WIN32
+   struct stat there;
+#else
+   _wrmdir(WIDE(target));
+#endif
 
    if (rename(path, target) == 0) return -1;
+#ifndef _WIN32
    error = errno;
    if (stat(target, &there) != 0) return error;
    if (chmod(path, there.st_mode & 07777) != 0) return errno;
+#endif
 #if defined RENAME_EXCHANGE
    if (renameat2(AT_FDCWD, path, AT_FDCWD, target, RENAME_EXCHANGE) == 0) return 0;
    if (errno != EINVAL && errno != ENOSYS && errno != ENOTSUP) return errno;
@@ -186,9 +277,27 @@ int thud_swap(const char *path, const char *target)
 // Path without links, at most `length` bytes including the final zero.
 int thud_get_real_path(const char *path, char *text, size_t length)
 {
-   char resolved[PATH_MAX];
+   char resolved[LONGEST];
+#ifdef _WIN32
+   wchar_t found[LONGEST];
+   HANDLE file = CreateFileW(WIDE(path), 0, FILE_SHARE_READ | FILE_SHARE_WRITE | FILE_SHARE_DELETE, NULL, OPEN_EXISTING,
+      FILE_FLAG_BACKUP_SEMANTICS, NULL);
+   // What is missing has no links.
+   DWORD count = file == INVALID_HANDLE_VALUE ? GetFullPathNameW(WIDE(path), LONGEST, found, NULL)
+      : GetFinalPathNameByHandleW(file, found, LONGEST, 0);
+
+   if (file != INVALID_HANDLE_VALUE) CloseHandle(file);
+   if (count == 0 || count >= LONGEST) return ENAMETOOLONG;
+   to_utf8(found, resolved);
+   for (char *at = resolved; *at; at++)
+      if (*at == '\\') *at = '/';
+   // The system writes drives as `//?/C:/...`, shares as `//?/UNC/server/...`.
+   if (strncmp(resolved, "//?/UNC/", 8) == 0) memmove(resolved + 1, resolved + 7, strlen(resolved + 7) + 1);
+   else if (strncmp(resolved, "//?/", 4) == 0) memmove(resolved, resolved + 4, strlen(resolved + 4) + 1);
+#else
 
    if (!realpath(path, resolved)) return errno;
+#endif
    return (size_t)snprintf(text, length, "%s", resolved) < length ? 0 : ENAMETOOLONG;
 }
 
@@ -200,9 +309,12 @@ int thud_list(const char *path, char *names, size_t length)
    size_t used = 0;
 
    if (!directory) return -1;
-   while ((entry = readdir(directory)) && used < length)
-      if (strcmp(entry->d_name, ".") != 0 && strcmp(entry->d_name, "..") != 0)
-         used += (size_t)snprintf(names + used, length - used, "%s/", entry->d_name);
+   while ((entry = readdir(directory)) && used < length) {
+      const char *name = NAME_OF(entry);
+
+      if (strcmp(name, ".") != 0 && strcmp(name, "..") != 0)
+         used += (size_t)snprintf(names + used, length - used, "%s/", name);
+   }
    closedir(directory);
    return used < length ? (int)used : -1;
 }
