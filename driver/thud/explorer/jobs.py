@@ -9,6 +9,7 @@ import tempfile
 import threading
 from contextlib import suppress
 from multiprocessing import get_context, parent_process
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import anyio
@@ -148,12 +149,16 @@ def _run_tasks(connection: Connection) -> None:
         import resource
 
         resource.setrlimit(resource.RLIMIT_AS, (MAX_MEMORY, MAX_MEMORY))
+    place = Path.cwd()
     with suppress(EOFError, OSError):
         while True:
             folder, task, arguments = connection.recv()
             tempfile.tempdir = folder
             os.chdir(folder)
-            connection.send(_run_task(task, arguments))
+            report = _run_task(task, arguments)
+            # Windows does not remove a folder where a process is.
+            os.chdir(place)
+            connection.send(report)
 
 
 def _end_with_server() -> None:

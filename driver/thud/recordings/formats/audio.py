@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import struct
+import sys
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+# libsndfile takes the bytes of a path, but in Windows its text.
+_native = os.fspath if sys.platform == "win32" else os.fsencode
 # Counts at full scale by subtype, None for floats.
 SUBTYPES = {
     "PCM_S8": 2.0**7, "PCM_U8": 2.0**7, "PCM_16": 2.0**15, "PCM_24": 2.0**23, "PCM_32": 2.0**31,
@@ -36,7 +39,7 @@ RF64_LENGTH = slice(28, 36)
 
 def _read(path: Path, column: int, start: int, stop: int) -> NDArray[np.float64]:
     soundfile = library("soundfile", "recordings")
-    with guarded(path, "an audio file"), soundfile.SoundFile(os.fsencode(path)) as file:
+    with guarded(path, "an audio file"), soundfile.SoundFile(_native(path)) as file:
         file.seek(start)
         block: NDArray[np.float64] = file.read(stop - start, dtype="float64", always_2d=True)
     return np.ascontiguousarray(block[:, column])
@@ -45,7 +48,7 @@ def _read(path: Path, column: int, start: int, stop: int) -> NDArray[np.float64]
 def read_channels(path: Path) -> list[Channel]:
     """Return the channels of an audio file; integers are fractions of full scale."""
     name = shown_text(path)
-    with library("soundfile", "recordings").SoundFile(os.fsencode(path)) as file:
+    with library("soundfile", "recordings").SoundFile(_native(path)) as file:
         kind, count, columns = file.subtype, file.frames, file.channels
         rate, is_flac = float(file.samplerate), file.format == "FLAC"
     if kind not in SUBTYPES:
