@@ -27,7 +27,7 @@ from thud.impact.datasets import NO_ERRORS, RESULTS, ensemble_dataset, sample_ta
 from thud.level.levels import FORCES, peak_count
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Collection, Mapping
 
     import pandas as pd
     import xarray as xr
@@ -247,27 +247,25 @@ def solve_many(  # noqa: PLR0913 - samples, and how to compute them
     content = case_text(base)
     if not hasattr(parameters, "keys"):
         refuse_value("parameters", parameters, "arrays by their keys")
-    n_thread = usable_threads() if threads is None else threads
-    require_whole("threads", n_thread, 1, MAX_THREADS)
+    width = usable_threads() if threads is None else threads
+    require_whole("threads", width, 1, MAX_THREADS)
     length = math.ceil(base.sampling.duration * base.sampling.sample_rate) if forces else 0
     try:
         # Without parameters, there is only the drop of the case.
         columns, numbers = _columns(dict(parameters) or {"height": base.drop.height}, base)
         # Raises MemoryError before the computation if the results do not fit.
         np.empty((len(numbers), len(FORCES), length))
-        size = _MAX_VALUES // (_SAMPLE_VALUES + len(FORCES) * length)
+        size = max(1, _MAX_VALUES // (_SAMPLE_VALUES + len(FORCES) * length))
         if progress:
-            size = min(size, max(_MIN_SAMPLES * n_thread, len(numbers) // _STEPS))
+            size = min(size, max(_MIN_SAMPLES * width, len(numbers) // _STEPS))
         blocks = []
         with tqdm(total=len(numbers), unit="sample", disable=not progress, leave=False) as bar:
-            for start in range(0, max(1, len(numbers)), max(1, size)):
-                block = numbers[start : start + max(1, size)]
-                blocks.append(
-                    _compute(content, columns, block, n_thread, levels=levels, forces=forces)
-                )
+            for start in range(0, max(1, len(numbers)), size):
+                block = numbers[start : start + size]
+                results = _compute(content, columns, block, width, levels=levels, forces=forces)
+                blocks.append(results)
                 bar.update(len(block))
-        results, *more = blocks
-        if more:
+        if len(blocks) > 1:
             results = {name: np.concatenate([block[name] for block in blocks]) for name in results}
     except MemoryError as error:
         problem = f"the parameters, or forces of {length} values each, do not fit in memory"
@@ -286,7 +284,7 @@ def solve_many(  # noqa: PLR0913 - samples, and how to compute them
 
 def _compute(  # noqa: PLR0913 - the arguments of the library
     content: bytes,
-    keys: Iterable[str],
+    keys: Collection[str],
     numbers: NDArray[np.float64],
     threads: int,
     *,
@@ -294,10 +292,9 @@ def _compute(  # noqa: PLR0913 - the arguments of the library
     forces: bool,
 ) -> dict[str, NDArray[Any]]:
     """Return the results of a block of samples; the first axis is the sample."""
-    names = list(keys)
     answer = ask(
-        "samples", case=content, keys=",".join(names).encode("ascii", "replace"),
-        key_count=len(names), values=numbers.T, threads=threads, levels=levels, forces=forces,
+        "samples", case=content, keys=",".join(keys).encode("ascii", "replace"),
+        key_count=len(keys), values=numbers.T, threads=threads, levels=levels, forces=forces,
     )  # fmt: skip
     reasons = answer.pop("reasons").split("\n")[:-1]
     for force in FORCES:
