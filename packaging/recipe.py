@@ -1,6 +1,6 @@
 """Write the conda recipe of a source distribution beside it.
 
-Run as ``python packaging/recipe.py dist/thud-1.0.0.tar.gz``.
+Run as ``python packaging/recipe.py dist/thud_acoustics-1.0.0.tar.gz``.
 """
 
 import hashlib
