@@ -11,6 +11,7 @@ import re
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 # Licences of the libraries that may be bundled, by the beginnings of their names.
@@ -18,6 +19,7 @@ LICENCES = {
     "libblas": "BSD-3-Clause",
     "liblapack": "BSD-3-Clause",
     "libopenblas": "BSD-3-Clause",
+    "libscipy_openblas": "BSD-3-Clause",
     "libfftw3": "GPL-2.0-or-later",
     "libgfortran": "GPL-3.0-or-later WITH GCC-exception-3.1",
     "libgomp": "GPL-3.0-or-later WITH GCC-exception-3.1",
@@ -51,29 +53,36 @@ def licence_of(library: str) -> str:
     raise SystemExit(message)
 
 
-def add_licences(wheel: Path) -> None:
-    """Add the licences of what is bundled to an unpacked wheel."""
+def bundled(wheel: Path) -> dict[str, list[Path]]:
+    """Return the licences of the packages whose libraries auditwheel has added, by their names."""
+    (materials,) = wheel.glob("*.dist-info/sboms/auditwheel.cdx.json")
+    parts = json.loads(materials.read_text(encoding="utf-8"))["components"]
+    return {
+        name: licence_files(name) for name in {part["name"] for part in parts} - {"thud-acoustics"}
+    }
+
+
+def add_licences(
+    wheel: Path, licences: Mapping[str, Sequence[Path]], libraries: Iterable[str]
+) -> None:
+    """Add the licences of packages to an unpacked wheel, and state those of bundled libraries."""
     (information,) = wheel.glob("*.dist-info")
-    materials = json.loads((information / "sboms/auditwheel.cdx.json").read_text(encoding="utf-8"))
-    packages = sorted({part["name"] for part in materials["components"]} - {"thud"})
     headers = []
-    for package in packages:
-        files = licence_files(package)
+    for package, files in sorted(licences.items()):
         if not files:
             message = f"the package {package} has no licence"
             raise SystemExit(message)
         for file in files:
-            name = Path("bundled", file.parent.name, file.name)
+            name = Path("bundled", package, file.name)
             target = information / "licenses" / name
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(file.read_bytes())
             headers.append(f"License-File: {name}\n")
-    (folder,) = wheel.glob("*.libs")
-    found = {licence_of(library.name) for library in folder.iterdir()} - {"BSD-3-Clause"}
+    found = {licence_of(name) for name in libraries} - {"BSD-3-Clause"}
     metadata = information / "METADATA"
     text, count = re.subn(
         r"^(License-Expression: BSD-3-Clause)\n",
-        rf"\1 AND {' AND '.join(sorted(found))}\n{''.join(sorted(set(headers)))}",
+        rf"\1 AND {' AND '.join(sorted(found))}\n{''.join(headers)}",
         metadata.read_text(encoding="utf-8"),
         count=1,
         flags=re.MULTILINE,
@@ -92,7 +101,8 @@ def main(wheel: str, directory: str) -> None:
         (repaired,) = Path(place, "repaired").iterdir()
         run(*tool, "unpack", "--dest", f"{place}/unpacked", repaired)
         (unpacked,) = Path(place, "unpacked").iterdir()
-        add_licences(unpacked)
+        (folder,) = unpacked.glob("*.libs")
+        add_licences(unpacked, bundled(unpacked), [file.name for file in folder.iterdir()])
         Path(directory).mkdir(parents=True, exist_ok=True)
         print(run(*tool, "pack", "--dest-dir", directory, unpacked), end="")
 

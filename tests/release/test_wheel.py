@@ -19,7 +19,7 @@ import pytest
 import thud
 
 PACKAGE = Path(thud.__file__).parent
-LIBRARIES = PACKAGE.with_name("thud.libs")
+LIBRARIES = PACKAGE.with_name("thud_acoustics.libs")
 SCRIPTS = Path(sysconfig.get_path("scripts"))
 LOADER = "/lib64/ld-linux-x86-64.so.2"
 # What each Linux has: glibc, and the library of gcc by which it ends threads.
@@ -69,15 +69,15 @@ def test_libraries_come_with_the_wheel(binary: Path) -> None:
 
 
 def test_each_bundled_library_has_its_licence() -> None:
-    files = metadata.files("thud")
+    files = metadata.files("thud-acoustics")
     assert files is not None
     (materials,) = [file for file in files if file.name == "auditwheel.cdx.json"]
     parts = json.loads(materials.read_text())["components"]
-    packages = {part["name"] for part in parts} - {"thud"}
+    packages = {part["name"] for part in parts} - {"thud-acoustics"}
     licensed = {file.parent.name for file in files if "bundled" in file.parts}
     assert len(packages) >= 4
     assert packages <= licensed
-    licence = metadata.metadata("thud")["License-Expression"]
+    licence = metadata.metadata("thud-acoustics")["License-Expression"]
     assert licence.startswith("BSD-3-Clause AND GPL-2.0-or-later AND ")
 
 
