@@ -28,7 +28,7 @@ def main(source: str) -> None:
     project = tomllib.loads((REPOSITORY / "pyproject.toml").read_text(encoding="utf-8"))
     path = Path(source)
     values = {
-        "version": path.name.removeprefix("thud-").removesuffix(".tar.gz"),
+        "version": path.name.removeprefix("thud_acoustics-").removesuffix(".tar.gz"),
         "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
         "build": "\n    - ".join(["", *map(conda, project["build-system"]["requires"])]).strip(),
         "run": "\n    - ".join(["", *map(conda, project["project"]["dependencies"])]).strip(),

@@ -70,8 +70,8 @@ def bring_artifact(name: str, version: str, pattern: str, target: Path) -> None:
 
 def bring_libraries() -> None:
     """Bring what thud is linked with, and Python."""
-    bring_wheel("scipy-openblas32", r"scipy_openblas32/(lib/.*\.dll)", LIBRARIES)
-    bring_wheel("scipy-openblas32", r".*/licenses/(LICENSE.txt)", LIBRARIES)
+    openblas = r"[^/]*/(?:licenses/)?(lib/.*\.dll|LICENSE.txt)"
+    bring_wheel("scipy-openblas32", openblas, LIBRARIES)
     bring_wheel("pyFFTW", r"pyfftw/(libfftw3-3.dll)", LIBRARIES / "lib")
     bring_wheel("numpy", r"numpy/_core/(include/.*)", LIBRARIES)
     copy2("/usr/include/fftw3.f03", LIBRARIES / "include")
@@ -136,9 +136,11 @@ def main(directory: str) -> None:
     """Build all."""
     target = Path(directory).resolve()
     target.mkdir(parents=True, exist_ok=True)
-    if not PYTHON.exists():
-        rmtree(LIBRARIES, ignore_errors=True)
+    mark, python = BUILD / "brought", "{}.{}".format(*sys.version_info)
+    if not mark.exists() or mark.read_text() != python:
+        rmtree(BUILD, ignore_errors=True)
         bring_libraries()
+        mark.write_text(python)
     (version,) = re.findall(r"version = '([0-9.]+)'", (ROOT / "src/base/constants.f90").read_text())
     make_program(f"thud-{version}", target)
     make_wheel(target)

@@ -119,14 +119,18 @@ contains
       !> Set if the directory cannot be made.
       type(error_type), allocatable, intent(out) :: error
       character(len=:), allocatable :: target
-      logical :: exists
       integer :: i, status
 
       target = trim(get_real_path(self%path))
       status = 0
       do i = 2, len(target)
-         if (target(i:i) /= '/' .or. status > 0) cycle
-         if (get_size(target(:i - 1)) /= is_directory) status = make_directory(target(:i - 1)//c_null_char)
+         if (target(i:i) /= '/') cycle
+         if (get_size(target(:i - 1)) == is_directory) then
+            ! The computer in the path of a share is no directory.
+            status = 0
+         else if (status <= 0) then
+            status = make_directory(target(:i - 1)//c_null_char)
+         end if
       end do
       ! The parents may have been missing before.
       target = trim(get_real_path(self%path))

@@ -11,7 +11,7 @@ module thud_run
    use thud_records, only: add_results
    use thud_result_directory, only: add_text, check_target, close_results, open_results, result_directory_type
    use thud_screen_tables, only: get_screen_tables
-   use thud_system, only: path_length, read_text_file, separator
+   use thud_system, only: path_length, read_text_file
    use thud_text, only: newline
    implicit none (type, external)
    private
@@ -149,7 +149,7 @@ contains
       character(len=:), allocatable :: text
       integer :: dot, slash
 
-      slash = scan(path, '/'//separator, back=.true.)
+      slash = scan(path, '/\', back=.true.)
       dot = index(path, '.', back=.true.)
       ! A name that begins with its only point has no ending.
       if (dot <= slash + 1) dot = len(path) + 1

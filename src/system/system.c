@@ -33,6 +33,17 @@ static const char *to_utf8(const wchar_t *path, char text[LONGEST])
    return text;
 }
 
+// Scanners of viruses hold new files for a moment.
+static int rename_wide(const wchar_t *path, const wchar_t *target)
+{
+   for (int i = 0; i < 10; i++) {
+      if (_wrename(path, target) == 0) return 0;
+      if (errno != EACCES) return -1;
+      Sleep(50);
+   }
+   return -1;
+}
+
 #define WIDE(path) to_wide(path, (wchar_t[LONGEST]){0})
 #define NAME_OF(entry) to_utf8(entry->d_name, (char[LONGEST]){0})
 #define OPEN(path) _wopen(WIDE(path), O_WRONLY | O_CREAT | O_APPEND | O_BINARY | O_NOINHERIT, 0666)
@@ -43,7 +54,7 @@ static const char *to_utf8(const wchar_t *path, char text[LONGEST])
 #define closedir(directory) _wclosedir(directory)
 #define mkdir(path, mode) _wmkdir(WIDE(path))
 #define remove(path) (_wremove(WIDE(path)) == 0 ? 0 : _wrmdir(WIDE(path)))
-#define rename(path, target) _wrename(WIDE(path), WIDE(target))
+#define rename(path, target) rename_wide(WIDE(path), WIDE(target))
 #else
 #define LONGEST PATH_MAX
 #define NAME_OF(entry) entry->d_name
@@ -74,6 +85,7 @@ void thud_end_call(void)
 
 #ifdef _WIN32
 static int is_executable = 0;
+static UINT code_page;
 
 // Windows calls this in a thread of its own: of the library first, then of what hosts it, such as Python. The executable
 // ends at the third request.
@@ -82,7 +94,7 @@ static BOOL WINAPI record_event(DWORD event)
    static atomic_int count = 0;
 
    (void)event;
-   if (running > 0) thud_latest_signal = SIGINT;
+   thud_interrupt_calls();
    if (is_executable && ++count == 3) ExitProcess(128 + SIGINT);
    return is_executable;
 }
@@ -95,11 +107,18 @@ void thud_begin_call(void)
    if (!atomic_flag_test_and_set(&hooked)) SetConsoleCtrlHandler(record_event, TRUE);
 }
 
-// The screen takes UTF-8, and line feeds as they are.
+static void restore_screen(void)
+{
+   SetConsoleOutputCP(code_page);
+}
+
+// Until the process ends the screen takes UTF-8, and line feeds as they are.
 void thud_prepare_process(void)
 {
    is_executable = 1;
+   code_page = GetConsoleOutputCP();
    SetConsoleOutputCP(CP_UTF8);
+   atexit(restore_screen);
    for (int i = 1; i <= STDERR_FILENO; i++) _setmode(i, O_BINARY);
    thud_begin_call();
 }
@@ -196,15 +215,11 @@ int thud_write(const char *path, int descriptor, const char *bytes, size_t lengt
    }
    // Some systems report a full disk only when the file is closed.
    if (*path && file >= 0 && close(file) != 0 && !error) error = errno;
+#ifdef _WIN32
+   if (!*path && error == EINVAL) error = EPIPE;
+#endif
    return error == EPIPE || error == EBADF ? 0 : error;
 }
-
-// Separates the names of a path beside the slash; a slash if there is no other.
-#ifdef _WIN32
-const char thud_separator = '\\';
-#else
-const char thud_separator = '/';
-#endif
 
 // Removes a file or an empty directory.
 int thud_remove(const char *path)
@@ -216,22 +231,29 @@ int thud_remove(const char *path)
 long long thud_get_size(const char *path)
 {
 #ifdef _WIN32
-   struct _stat64 found;
-   int error = _wstat64(WIDE(path), &found);
+   WIN32_FILE_ATTRIBUTE_DATA found;
+
+   if (!GetFileAttributesExW(WIDE(path), GetFileExInfoStandard, &found)) return -1;
+   if (found.dwFileAttributes & FILE_ATTRIBUTE_DIRECTORY) return -2;
+   return (long long)found.nFileSizeHigh << 32 | found.nFileSizeLow;
 #else
    struct stat found;
-   int error = stat(path, &found);
-#endif
 
-   if (error != 0) return -1;
+   if (stat(path, &found) != 0) return -1;
    return S_ISDIR(found.st_mode) ? -2 : found.st_size;
+#endif
 }
 
 // Path as Fortran opens it, in the code page of the process on Windows; at most `length` bytes including the final zero.
 int thud_get_native_path(const char *path, char *text, size_t length)
 {
 #ifdef _WIN32
-   if (WideCharToMultiByte(CP_ACP, 0, WIDE(path), -1, text, (int)length, NULL, NULL)) return 0;
+   // Of UTF-8 all is found; other pages lack letters, for which another path would be opened.
+   BOOL lacks = FALSE;
+   int is_utf8 = GetACP() == CP_UTF8;
+
+   if (WideCharToMultiByte(CP_ACP, is_utf8 ? 0 : WC_NO_BEST_FIT_CHARS, WIDE(path), -1, text, (int)length, NULL,
+         is_utf8 ? NULL : &lacks) && !lacks) return 0;
 #endif
    return (size_t)snprintf(text, length, "%s", path) < length ? 0 : ENAMETOOLONG;
 }
@@ -282,12 +304,13 @@ int thud_get_real_path(const char *path, char *text, size_t length)
    wchar_t found[LONGEST];
    HANDLE file = CreateFileW(WIDE(path), 0, FILE_SHARE_READ | FILE_SHARE_WRITE | FILE_SHARE_DELETE, NULL, OPEN_EXISTING,
       FILE_FLAG_BACKUP_SEMANTICS, NULL);
-   // What is missing has no links.
-   DWORD count = file == INVALID_HANDLE_VALUE ? GetFullPathNameW(WIDE(path), LONGEST, found, NULL)
-      : GetFinalPathNameByHandleW(file, found, LONGEST, 0);
+   DWORD count = GetFinalPathNameByHandleW(file, found, LONGEST, 0);
 
    if (file != INVALID_HANDLE_VALUE) CloseHandle(file);
+   // What is missing has no links, and some file systems know none.
+   if (count == 0) count = GetFullPathNameW(WIDE(path), LONGEST, found, NULL);
    if (count == 0 || count >= LONGEST) return ENAMETOOLONG;
+   if (count > 3 && found[count - 1] == L'\\') found[count - 1] = 0;
    to_utf8(found, resolved);
    for (char *at = resolved; *at; at++)
       if (*at == '\\') *at = '/';

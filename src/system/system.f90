@@ -63,9 +63,6 @@ module thud_system
    procedure(reading_call), bind(c, name='thud_get_real_path') :: c_get_real_path
    procedure(reading_call), bind(c, name='thud_get_native_path') :: c_get_native_path
 
-   !> Separates the names of a path beside the slash, which all systems know; a slash if there is no other.
-   character(kind=c_char), protected, public, bind(c, name='thud_separator') :: separator
-
    interface
       function c_isatty(descriptor) bind(c, name='isatty') result(yes)
          import :: c_int
@@ -117,7 +114,7 @@ contains
       integer, intent(in) :: descriptor
       logical :: yes
 
-      yes = c_isatty(int(descriptor, c_int)) == 1
+      yes = c_isatty(int(descriptor, c_int)) /= 0
    end function is_terminal
 
    !> Writes a whole text to the screen.

@@ -126,7 +126,7 @@ def test_names_whose_packages_are_missing_say_so() -> None:
     done = python("-c", code)
     lines = done.stdout.splitlines()
     assert [re.match(r"\w+", line)[0] for line in lines] == [*3 * ["xarray"], "pandas"]  # type: ignore[index]
-    assert all(line.endswith("pip install 'thud-acoustics[studies]'") for line in lines)
+    assert all(line.endswith('pip install "thud-acoustics[studies]"') for line in lines)
 
 
 @pytest.mark.parametrize(

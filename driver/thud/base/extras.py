@@ -22,7 +22,7 @@ def require_extra(extra: str) -> Iterator[None]:
     try:
         yield
     except ModuleNotFoundError as error:
-        refuse(f"{error.name} is not installed", f"pip install 'thud-acoustics[{extra}]'", error)
+        refuse(f"{error.name} is not installed", f'pip install "thud-acoustics[{extra}]"', error)
 
 
 def library(name: str, extra: str) -> Any:  # noqa: ANN401 - a module

@@ -9,7 +9,6 @@ import tempfile
 import threading
 from contextlib import suppress
 from multiprocessing import get_context, parent_process
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import anyio
@@ -103,8 +102,7 @@ class Jobs:
         """Return a process, its connection, and the child's end if the process is new."""
         while self._idle:
             process, connection = self._idle.pop()
-            # If the process has ended, its connection is readable (end of file).
-            if not connection.poll():
+            if process.is_alive():
                 return process, connection, None
             _kill(process)
         connection, child_end = self._context.Pipe()
@@ -149,7 +147,7 @@ def _run_tasks(connection: Connection) -> None:
         import resource
 
         resource.setrlimit(resource.RLIMIT_AS, (MAX_MEMORY, MAX_MEMORY))
-    place = Path.cwd()
+    place = tempfile.gettempdir()
     with suppress(EOFError, OSError):
         while True:
             folder, task, arguments = connection.recv()
