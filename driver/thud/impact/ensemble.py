@@ -238,8 +238,7 @@ def solve_many(  # noqa: PLR0913 - samples, and how to compute them
     require_kind("case", base, Case)
     for name, value in {"levels": levels, "forces": forces, "progress": progress}.items():
         require_kind(name, value, bool | np.bool_)
-    own = base.model.name if base.model else ""
-    if model is not None and not (isinstance(model, str) and model == own):
+    if model is not None and str(model) != (base.model.name if base.model else ""):
         base = replace(base, model=new_model(model, {}))
     if base.model is None:
         refuse("the case has no source model", "a case with a model, or model = its name")

@@ -5,9 +5,9 @@ from __future__ import annotations
 import ast
 import json
 import runpy
+from pathlib import Path
 
-from conftest import REPOSITORY
-
+REPOSITORY = Path(__file__).parents[2]
 RECORD = json.loads((REPOSITORY / "docs/validation.json").read_text(encoding="utf-8"))
 PAGE = runpy.run_path(str(REPOSITORY / "docs/site/validation.py"))
 
