@@ -58,7 +58,7 @@ def bundled(wheel: Path) -> dict[str, list[Path]]:
     (materials,) = wheel.glob("*.dist-info/sboms/auditwheel.cdx.json")
     parts = json.loads(materials.read_text(encoding="utf-8"))["components"]
     return {
-        name: licence_files(name) for name in {part["name"] for part in parts} - {"thud-acoustics"}
+        name: licence_files(name) for name in {part["name"] for part in parts} - {"thud_acoustics"}
     }
 
 

@@ -73,7 +73,7 @@ def test_each_bundled_library_has_its_licence() -> None:
     assert files is not None
     (materials,) = [file for file in files if file.name == "auditwheel.cdx.json"]
     parts = json.loads(materials.read_text())["components"]
-    packages = {part["name"] for part in parts} - {"thud-acoustics"}
+    packages = {part["name"] for part in parts} - {"thud_acoustics"}
     licensed = {file.parent.name for file in files if "bundled" in file.parts}
     assert len(packages) >= 4
     assert packages <= licensed
