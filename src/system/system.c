@@ -44,20 +44,20 @@ static int rename_wide(const wchar_t *path, const wchar_t *target)
    return -1;
 }
 
+// Windows keeps what is read only.
+static int remove_wide(const wchar_t *path)
+{
+   _wchmod(path, _S_IREAD | _S_IWRITE);
+   return _wremove(path) == 0 ? 0 : _wrmdir(path);
+}
+
 #define WIDE(path) to_wide(path, (wchar_t[LONGEST]){0})
-#define NAME_OF(entry) to_utf8(entry->d_name, (char[LONGEST]){0})
 #define OPEN(path) _wopen(WIDE(path), O_WRONLY | O_CREAT | O_APPEND | O_BINARY | O_NOINHERIT, 0666)
-#define DIR _WDIR
-#define dirent _wdirent
-#define opendir(path) _wopendir(WIDE(path))
-#define readdir(directory) _wreaddir(directory)
-#define closedir(directory) _wclosedir(directory)
 #define mkdir(path, mode) _wmkdir(WIDE(path))
-#define remove(path) (_wremove(WIDE(path)) == 0 ? 0 : _wrmdir(WIDE(path)))
+#define remove(path) remove_wide(WIDE(path))
 #define rename(path, target) rename_wide(WIDE(path), WIDE(target))
 #else
 #define LONGEST PATH_MAX
-#define NAME_OF(entry) entry->d_name
 #define OPEN(path) open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666)
 #endif
 
@@ -254,6 +254,7 @@ int thud_get_native_path(const char *path, char *text, size_t length)
 
    if (WideCharToMultiByte(CP_ACP, is_utf8 ? 0 : WC_NO_BEST_FIT_CHARS, WIDE(path), -1, text, (int)length, NULL,
          is_utf8 ? NULL : &lacks) && !lacks) return 0;
+   path = "?";
 #endif
    return (size_t)snprintf(text, length, "%s", path) < length ? 0 : ENAMETOOLONG;
 }
@@ -290,7 +291,11 @@ int thud_swap(const char *path, const char *target)
    if (errno != ENOTSUP) return errno;
 #endif
    if ((size_t)snprintf(old, sizeof old, "%s.old", target) >= sizeof old) return ENAMETOOLONG;
-   if (rename(target, old) != 0) return errno;
+   // What has that name is not ours.
+   if (rename(target, old) != 0) {
+      if ((size_t)snprintf(old, sizeof old, "%s.old", path) >= sizeof old) return ENAMETOOLONG;
+      if (rename(target, old) != 0) return errno;
+   }
    if (rename(path, target) == 0) return rename(old, path) == 0 ? 0 : errno;
    error = errno;
    return rename(old, target) == 0 ? error : errno;
@@ -324,20 +329,35 @@ int thud_get_real_path(const char *path, char *text, size_t length)
    return (size_t)snprintf(text, length, "%s", resolved) < length ? 0 : ENAMETOOLONG;
 }
 
+// Adds a name and a slash to names in a directory, but for the directory itself and its parent.
+static void add_name(const char *name, char *names, size_t length, size_t *used)
+{
+   if (*used < length && strcmp(name, ".") != 0 && strcmp(name, "..") != 0)
+      *used += (size_t)snprintf(names + *used, length - *used, "%s/", name);
+}
+
 // Names in a directory, each with a slash behind it; their length, or a negative number if they cannot be read or are longer.
 int thud_list(const char *path, char *names, size_t length)
 {
+   size_t used = 0;
+#ifdef _WIN32
+   char pattern[LONGEST], name[LONGEST];
+   WIN32_FIND_DATAW entry;
+   HANDLE search;
+
+   if ((size_t)snprintf(pattern, sizeof pattern, "%s/*", path) >= sizeof pattern) return -1;
+   search = FindFirstFileW(WIDE(pattern), &entry);
+   if (search == INVALID_HANDLE_VALUE) return -1;
+   do add_name(to_utf8(entry.cFileName, name), names, length, &used);
+   while (FindNextFileW(search, &entry));
+   FindClose(search);
+#else
    DIR *directory = opendir(path);
    struct dirent *entry;
-   size_t used = 0;
 
    if (!directory) return -1;
-   while ((entry = readdir(directory)) && used < length) {
-      const char *name = NAME_OF(entry);
-
-      if (strcmp(name, ".") != 0 && strcmp(name, "..") != 0)
-         used += (size_t)snprintf(names + used, length - used, "%s/", name);
-   }
+   while ((entry = readdir(directory))) add_name(entry->d_name, names, length, &used);
    closedir(directory);
+#endif
    return used < length ? (int)used : -1;
 }

@@ -130,7 +130,7 @@ def read_channels(path: Path) -> list[Channel]:
 
     Raise InputError if the format is unknown or the file is damaged.
     """
-    with guarded(path, "a file"), path.open("rb") as file:
+    with guarded(path, "data"), path.open("rb") as file:
         head = file.read(HEAD)
     name = shown_text(path)
     if not head:

@@ -39,7 +39,7 @@ RF64_LENGTH = slice(28, 36)
 
 def _read(path: Path, column: int, start: int, stop: int) -> NDArray[np.float64]:
     soundfile = library("soundfile", "recordings")
-    with guarded(path, "an audio file"), soundfile.SoundFile(_native(path)) as file:
+    with guarded(path, "audio"), soundfile.SoundFile(_native(path)) as file:
         file.seek(start)
         block: NDArray[np.float64] = file.read(stop - start, dtype="float64", always_2d=True)
     return np.ascontiguousarray(block[:, column])
