@@ -254,6 +254,7 @@ int thud_get_native_path(const char *path, char *text, size_t length)
 
    if (WideCharToMultiByte(CP_ACP, is_utf8 ? 0 : WC_NO_BEST_FIT_CHARS, WIDE(path), -1, text, (int)length, NULL,
          is_utf8 ? NULL : &lacks) && !lacks) return 0;
+   // No file has this name.
    path = "?";
 #endif
    return (size_t)snprintf(text, length, "%s", path) < length ? 0 : ENAMETOOLONG;
@@ -271,14 +272,15 @@ int thud_swap(const char *path, const char *target)
 {
    char old[LONGEST];
    int error;
-#ifndef _WIN32
-   struct stat there;
-#else
+#ifdef _WIN32
+
+   // Windows replaces no directory, not even an empty one.
    _wrmdir(WIDE(target));
-#endif
+   if (rename(path, target) == 0) return -1;
+#else
+   struct stat there;
 
    if (rename(path, target) == 0) return -1;
-#ifndef _WIN32
    error = errno;
    if (stat(target, &there) != 0) return error;
    if (chmod(path, there.st_mode & 07777) != 0) return errno;
