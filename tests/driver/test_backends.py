@@ -39,29 +39,28 @@ MODAL: dict[str, Any] = {
 }
 
 
-class Cancelling(Executor):
-    """An executor that computes two blocks and then loses its scheduler."""
+class Losing(Executor):
+    """An executor that loses some of the blocks that it is given, by their number."""
 
-    submitted = 0
+    def __init__(self, *lost: int) -> None:
+        self.lost, self.submitted = lost, 0
 
     def submit(self, function: Callable[..., Any], *block: Any) -> Future[Any]:  # type: ignore[override] # noqa: ANN401
-        """Compute one of the first two blocks, or cancel it."""
-        self.submitted += 1
+        """Compute a block, or cancel it."""
         future: Future[Any] = Future()
-        if self.submitted > 2:
+        if self.submitted in self.lost:
             future.cancel()
             future.set_running_or_notify_cancel()
         else:
             future.set_result(function(*block))
+        self.submitted += 1
         return future
 
 
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[LocalCluster]:
     """Two workers in processes of their own."""
-    with LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0"
-    ) as running:
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as running:
         yield running
 
 
@@ -78,7 +77,7 @@ def test_every_executor_gives_the_same(cluster: LocalCluster, tmp_path: Path) ->
     assert expected.sizes["sample"] > thud.read_study(STUDY).block_size
     spawn = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(2, spawn) as processes, Client(cluster) as client:
-        for executor in (None, processes, client.get_executor()):
+        for executor in (None, processes, client.get_executor(), Losing(0)):
             other = thud.sweep(STUDY, executor=executor).dataset
             assert other.drop_attrs(deep=False).identical(expected), executor
     other = thud.sweep(STUDY, tmp_path, workers=3).dataset
@@ -126,7 +125,7 @@ def test_lost_executor_is_reported_and_finished_blocks_are_kept(
         kill_at_first_block(monkeypatch, kill)
         executor: Executor = ProcessPoolExecutor(2, multiprocessing.get_context("spawn"))
     else:
-        executor = Cancelling()
+        executor = Losing(*range(2, 1000))
     words = naming("executor", "run the study again", *([] if is_killed else ["Cancelled"]))
     with executor, pytest.raises(thud.NumericalError, match=words):
         thud.sweep(MODAL, tmp_path, executor=executor)

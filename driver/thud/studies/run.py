@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict, TypeVar, Unpack
 
@@ -205,9 +205,10 @@ def _compute(
 ) -> Iterator[tuple[int, Columns, Columns]]:
     """Yield first sample, parameters and results of each block, in the order of their results.
 
-    Raises NumericalError if the executor loses a block, after all blocks that are done.
+    Raises NumericalError if the executor loses a block twice, after all blocks that are done.
     """
-    waiting = iter(starts)
+    waiting: Iterator[int] = iter(starts)
+    lost: set[int] = set()
     running: dict[Future[Columns], tuple[int, Columns]] = {}
     try:
         while True:
@@ -221,18 +222,24 @@ def _compute(
             done, _ = wait(running, return_when=FIRST_COMPLETED)
             # Blocks that the executor has lost are the last.
             for future in sorted(done, key=lambda f: f.cancelled() or f.exception() is not None):
+                start, columns = running.pop(future)
                 try:
                     result = future.result()
                 except ThudError:
                     raise
                 except Exception as error:
+                    # Dask loses one if the worker ends while its result is on the way.
+                    if start not in lost:
+                        lost.add(start)
+                        waiting = chain([start], waiting)
+                        continue
                     reason = f"{type(error).__name__}: {error}".partition("\n")[0]
                     message = (
                         f"the executor lost a block of samples ({reason.removesuffix(': ')}); "
                         "finished samples are kept; allowed: run the study again"
                     )
                     raise NumericalError(message) from error
-                yield *running.pop(future), result
+                yield start, columns, result
     finally:
         for future in running:
             future.cancel()
