@@ -170,20 +170,25 @@ contains
       if (yes .and. field%needs(2) /= '') yes = any(field%needs(2:) == fields(i)%choices(nint(fields(i)%get_number())))
    end function has_effect
 
-   !> Returns an error for the first value outside its range, NaN included.
+   !> Returns an error for the first value outside its range, NaN included; ranges that depend on other keys come last.
    subroutine check_fields(fields, error)
       !> The fields: [n_field].
       type(field_type), intent(in) :: fields(:)
       type(error_type), allocatable, intent(out) :: error
-      type(interval_type) :: interval
+      type(interval_type) :: intervals(size(fields))
       character(len=:), allocatable :: text
+      logical :: depends(size(fields))
       logical :: inside
+      integer :: indices(size(fields))
       integer :: i
 
+      indices = [(i, i=1, size(fields))]
+      intervals = [(get_interval(fields, i), i=1, size(fields))]
+      depends = intervals%lower_key /= '' .or. intervals%upper_key /= ''
+      indices = [pack(indices, .not. depends), pack(indices, depends)]
       do i = 1, size(fields)
-         associate (field => fields(i))
+         associate (field => fields(indices(i)), interval => intervals(indices(i)))
             inside = field%kind /= 'choice' .or. field%get_number() > 0.0_wp
-            interval = get_interval(fields, i)
             if (field%range /= '') inside = all(interval%contains(field%get_entries()))
             if (field%trait == 'whole') inside = inside .and. all(is_whole(field%get_entries()))
             if (inside) cycle

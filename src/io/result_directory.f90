@@ -206,7 +206,7 @@ contains
       type(error_type) :: error
 
       error = input_error(path//' cannot be used ('//trim(get_system_message(status))//'); allowed: a directory ' &
-         //'in a folder that you may write to')
+         //'that no program has open, in a folder that you may write to')
    end function unusable_error
 
 end module thud_result_directory

@@ -59,7 +59,7 @@ contains
          else if (iachar(clean(i:i)) < 32 .and. scan(clean(i:i), blanks) == 0 .or. iachar(clean(i:i)) > 126) then
             ! Such as the special blanks and quotes of word processors.
             error = input_error('line '//to_text(line)//' holds a character that is not plain text outside quotes and ' &
-               //'comments; allowed: letters, digits and signs of ASCII')
+               //'comments; allowed: letters, digits and signs of ASCII, saved as UTF-8')
          else if (latest%group == '') then
             if (scan(clean(i:i), blanks) > 0) cycle
             begin = i + verify(clean(i + 1:)//' ', name_characters)
