@@ -11,9 +11,6 @@ module thud_note
    !> Maximum length of what a note says.
    integer, parameter :: text_length = 240
 
-   !> Maximum length of a sentence.
-   integer, parameter :: sentence_length = 2*key_length + text_length + 4
-
    !> A fact about a group or a key of the input.
    type :: note_type
       !> What it is, for programs.
@@ -33,7 +30,7 @@ contains
    !> The sentence of a note, which names group and key.
    elemental function get_sentence(note) result(sentence)
       type(note_type), intent(in) :: note
-      character(len=sentence_length) :: sentence
+      character(len=2*key_length + len(note%quantity) + len(note%text) + 5) :: sentence
 
       sentence = '&'//trim(note%group)//': '//adjustl(trim(note%key)//' '//adjustl(trim(note%quantity)//' '//note%text))
    end function get_sentence

@@ -59,13 +59,17 @@ contains
       character(len=*), intent(in) :: group
       !> The warnings: [n].
       type(note_type), intent(in) :: warnings(:)
+      character(len=len(warnings%quantity) + len(warnings%text) + 1) :: text(size(warnings))
       integer :: i
 
       bundle%group = group
       if (size(warnings) == 0) return
       call bundle%add_texts('code', warnings%code)
       call bundle%add_texts('subject', get_subject(warnings))
-      call bundle%add_texts('text', [(adjustl(trim(warnings(i)%quantity)//' '//warnings(i)%text), i=1, size(warnings))])
+      do i = 1, size(warnings)
+         text(i) = adjustl(trim(warnings(i)%quantity)//' '//warnings(i)%text)
+      end do
+      call bundle%add_texts('text', text)
       call bundle%add_array('value', shape(warnings), warnings%value)
       call bundle%add_array('low', shape(warnings), warnings%low)
       call bundle%add_array('high', shape(warnings), warnings%high)
