@@ -30,6 +30,31 @@ module thud_command_line
    character(len=*), parameter :: usage = 'thud CASE.nml [--samples TABLE.csv [--threads N]] [--output DIR] [--replace] ' &
       //'[--all] [--check] [--quiet] [--verbose] | --keys | --schema | --help | --version'
 
+   !> The help text.
+   character(len=*), parameter :: help = &
+      'Force of a heavy/soft impact source on the floor, its levels and a verdict.'//newline//newline &
+      //'Usage: '//usage//newline//newline &
+      //'  CASE.nml             input, a namelist file; inputs/ holds examples'//newline &
+      //'  -o, --output DIR     directory for the results (default: outputs/<case>, with'//newline &
+      //'                       --samples outputs/<case>_samples)'//newline &
+      //'  --replace            replace also results of another case'//newline &
+      //'  --all                write also model_histories.csv: energies and other'//newline &
+      //'                       quantities of the model against time'//newline &
+      //'  --samples TABLE.csv  a header row of keys and one drop, a sample, in each'//newline &
+      //'                       further row; all other keys are those of CASE.nml'//newline &
+      //'  --threads N          threads for the samples (default: 1)'//newline &
+      //'  --check              exit with 3 if the source, with the values of CASE.nml,'//newline &
+      //'                       does not conform to the limits'//newline &
+      //'  -q, --quiet          show only errors and warnings'//newline &
+      //'  -v, --verbose        show also numbers of the solver: resolution, quantities'//newline &
+      //'                       of the model'//newline &
+      //'  --keys               show every key with default, range and meaning'//newline &
+      //'  --schema             the same and more as JSON, for programs'//newline &
+      //'  -h, --help           show this text'//newline &
+      //'  --version            show the version'//newline//newline &
+      //'Exit codes: 0 done, 1 bad input or usage, 2 numerical failure, 3 not conforming'//newline &
+      //'(--check), 130 interrupted, 143 terminated.'//newline//'Environment: NO_COLOR=1 shows no colors.'
+
    !> Address space that OpenBLAS allocates in each thread that uses it, bytes; without it OpenBLAS would wait forever.
    integer(int64), parameter :: blas_memory = 160000000_int64
 
@@ -138,7 +163,7 @@ contains
          case ('--schema')
             call get_schema(request%information)
          case ('-h', '--help')
-            call wrap_lines(help(), request%information)
+            call wrap_lines(help, request%information)
          case ('--replace')
             request%options%replace = .true.
          case ('--all')
@@ -191,34 +216,5 @@ contains
          error = input_error('--verbose contradicts --quiet; allowed: one of them')
       end if
    end subroutine parse_arguments
-
-   !> The help text.
-   pure function help() result(text)
-      !> Usage, options, exit codes.
-      character(len=:), allocatable :: text
-
-      text = 'Force of a heavy/soft impact source on the floor, its levels and a verdict.'//newline &
-         //newline//'Usage: '//usage//newline//newline &
-         //'  CASE.nml             input, a namelist file; inputs/ holds examples'//newline &
-         //'  -o, --output DIR     directory for the results (default: outputs/<case>, with'//newline &
-         //'                       --samples outputs/<case>_samples)'//newline &
-         //'  --replace            replace also results of another case'//newline &
-         //'  --all                write also model_histories.csv: energies and other'//newline &
-         //'                       quantities of the model against time'//newline &
-         //'  --samples TABLE.csv  a header row of keys and one drop, a sample, in each'//newline &
-         //'                       further row; all other keys are those of CASE.nml'//newline &
-         //'  --threads N          threads for the samples (default: 1)'//newline &
-         //'  --check              exit with 3 if the source, with the values of CASE.nml,'//newline &
-         //'                       does not conform to the limits'//newline &
-         //'  -q, --quiet          show only errors and warnings'//newline &
-         //'  -v, --verbose        show also numbers of the solver: resolution, quantities'//newline &
-         //'                       of the model'//newline &
-         //'  --keys               show every key with default, range and meaning'//newline &
-         //'  --schema             the same and more as JSON, for programs'//newline &
-         //'  -h, --help           show this text'//newline &
-         //'  --version            show the version'//newline//newline &
-         //'Exit codes: 0 done, 1 bad input or usage, 2 numerical failure, 3 not conforming'//newline &
-         //'(--check), 130 interrupted, 143 terminated.'//newline//'Environment: NO_COLOR=1 shows no colors.'
-   end function help
 
 end module thud_command_line

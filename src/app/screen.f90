@@ -46,7 +46,7 @@ contains
 
       lines = 'thud: '//text//newline
       if (is_terminal(standard_error)) call wrap_lines('thud: '//text//newline, lines)
-      if (has_colors(standard_error)) lines = painted(lines(:5), color)//lines(6:)
+      if (has_colors(standard_error)) lines = get_sequence(color)//lines(:5)//get_sequence(0)//lines(6:)
       call write_screen(standard_error, lines, exit_code)
    end subroutine print_message
 
@@ -136,14 +136,5 @@ contains
 
       sequence = achar(27)//'['//to_text(color)//'m'
    end function get_sequence
-
-   !> A text in color.
-   pure function painted(text, color) result(sequence)
-      character(len=*), intent(in) :: text
-      integer, intent(in) :: color
-      character(len=:), allocatable :: sequence
-
-      sequence = get_sequence(color)//text//get_sequence(0)
-   end function painted
 
 end module thud_screen
