@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NoReturn, get_args
 
@@ -24,6 +25,8 @@ MAX_SHOWN, MAX_TEXT = 80, 200
 MAX_NUMBER = 10**300
 # Maximum seed of the libraries that draw random samples.
 MAX_SEED = 2**32 - 1
+# Maximum number of threads.
+MAX_THREADS = 1024
 
 
 def refuse(  # noqa: PLR0913 - the fields of a note
@@ -130,6 +133,15 @@ def require_whole(name: str, value: Any, low: int, high: int) -> int:  # noqa: A
     if type(whole) is not int or not low <= whole <= high:
         refuse_value(name, value, f"whole numbers from {low} to {high}")
     return whole
+
+
+def thread_count(name: str, threads: int | None) -> int:
+    """Return a number of threads after a check; if it is None, that of the process's processors."""
+    if threads is None:
+        # Windows states all processors.
+        own = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+        threads = min(own or 1, MAX_THREADS)
+    return require_whole(name, threads, 1, MAX_THREADS)
 
 
 def require_number(

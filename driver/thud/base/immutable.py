@@ -39,7 +39,8 @@ def freeze(array: NDArray[Any]) -> NDArray[Any]:
 
 def _read_only(value: Any) -> Any:  # noqa: ANN401 - values of any kind
     if isinstance(value, np.ndarray) and value.flags.writeable:
-        value = freeze(value.copy())
+        value = value.copy()
+        value.setflags(write=False)
     if isinstance(value, list | tuple):
         entries = map(_read_only, value)
         return value._make(entries) if hasattr(value, "_make") else tuple(entries)

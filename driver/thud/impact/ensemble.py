@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -17,7 +16,7 @@ from thud.base.checks import (
     require_array,
     require_choice,
     require_kind,
-    require_whole,
+    thread_count,
 )
 from thud.base.display import Displayed
 from thud.base.immutable import freeze
@@ -37,7 +36,6 @@ if TYPE_CHECKING:
     from thud.base.key import Key
     from thud.base.note import Note
 
-MAX_THREADS = 1024
 # Maximum number of values of one call of the library, for its memory, and of one sample without its
 # forces.
 _MAX_VALUES = 2**26
@@ -174,12 +172,6 @@ class Ensemble(SampleQuantities, Displayed):
         return sample_table(self.to_xarray())
 
 
-def usable_threads() -> int:
-    """Return how many threads this process may use; Windows states all processors."""
-    own = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return min(own or 1, MAX_THREADS)
-
-
 def solve_many(  # noqa: PLR0913 - samples, and how to compute them
     parameters: Mapping[str, ArrayLike] | pd.DataFrame,
     case: Case | None = None,
@@ -246,8 +238,7 @@ def solve_many(  # noqa: PLR0913 - samples, and how to compute them
     content = case_text(base)
     if not hasattr(parameters, "keys"):
         refuse_value("parameters", parameters, "arrays by their keys")
-    width = usable_threads() if threads is None else threads
-    require_whole("threads", width, 1, MAX_THREADS)
+    width = thread_count("threads", threads)
     length = math.ceil(base.sampling.duration * base.sampling.sample_rate) if forces else 0
     try:
         # Without parameters, there is only the drop of the case.

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, TypedDict, TypeVar, Unpack
 from tqdm import tqdm
 
 from thud.base.bridge import api, version
-from thud.base.checks import refuse, refuse_unknown, require_kind, require_whole, shown
+from thud.base.checks import refuse, refuse_unknown, require_kind, shown, thread_count
 from thud.base.errors import InputError, NumericalError, ThudError
 from thud.base.files import replace_file
-from thud.impact.ensemble import MAX_THREADS, solve_many, usable_threads
+from thud.impact.ensemble import solve_many
 from thud.studies.dataset import (
     join_blocks,
     new_dataset,
@@ -188,9 +188,7 @@ def _executor(options: RunOptions) -> Iterator[tuple[Executor, int]]:
             refuse(f"workers = {shown(workers)} with an executor", "none: it has its own workers")
         yield executor, _SUBMITTED
         return
-    if workers is not None:
-        require_whole("workers", workers, 1, MAX_THREADS)
-    width = workers or usable_threads()
+    width = thread_count("workers", workers)
     with ThreadPoolExecutor(width) as threads:
         try:
             yield threads, 2 * width
