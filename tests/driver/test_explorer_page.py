@@ -449,9 +449,12 @@ def test_model_brings_its_values_and_fields(page: Page) -> None:
         see(page, key=WALL).to_have_count(int(bool(modulus)))
         if modulus:
             see(page, key="ball.youngs_modulus").to_have_value(modulus)
-    page.locator("#inputs .folded summary").click()
     see(page, key="modal_ball.fractional_order").to_have_count(0)
-    field(page, "modal_ball.damping_law").select_option("fractional")
+    # At once, before the event of the unfolding.
+    field(page, "modal_ball.damping_law").evaluate(
+        "law => { document.querySelector('#more summary').click(); law.value = 'fractional'; "
+        "law.dispatchEvent(new Event('change')); }"
+    )
     see(page, key="modal_ball.fractional_order").to_be_visible()
 
 

@@ -268,7 +268,9 @@ let isUnfolded = false;
 function foldedElement(groups, handlers, sources) {
   const parts = groups.map((group) => groupElement(group, handlers, sources, true)).filter(Boolean);
   const titles = parts.map((part) => part.querySelector("legend").textContent.toLowerCase());
-  const result = element("details", { open: isUnfolded, class: "folded" },
+  // The event of a click on it may come after that of a field.
+  isUnfolded = byId("more")?.open ?? isUnfolded;
+  const result = element("details", { id: "more", open: isUnfolded, class: "folded" },
     element("summary", {}, `More: ${titles.join(", ")}`), ...parts);
   result.addEventListener("toggle", () => { isUnfolded = result.open; });
   return result;
