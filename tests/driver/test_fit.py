@@ -429,5 +429,5 @@ def test_record_whose_last_millisecond_is_below_a_tenth_is_whole(
     if whole:
         assert target.compare().record.time[-1] == pytest.approx(time[-1])
     else:
-        with pytest.raises(thud.InputError, match=naming("target", "force", f"{last:.0%}")):
+        with pytest.raises(thud.InputError, match=naming("force", f"{last:.0%}")):
             target.compare()

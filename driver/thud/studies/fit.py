@@ -150,10 +150,7 @@ def _terms(case: Case, targets: Sequence[Target], parameters: Sequence[Parameter
                 check_case(replace(target_case, modes=None))
             comparison = target.compare()
         except InputError as error:
-            if len(targets) == 1:
-                raise
-            message = f"{label}: {str(error).removeprefix('target: ')}"
-            raise InputError(message, error.note) from error
+            raise error.within(label) from error
         ends = own + len(comparison.own), row + comparison.size
         result.append(Term(target_case, comparison, slice(own, ends[0]), slice(row, ends[1])))
         own, row = ends

@@ -165,15 +165,15 @@ def numbers(name: str, values: object, count: int) -> Array:
     except (TypeError, ValueError, OverflowError):
         array = np.empty(0)
     if array.shape != (count,) or not np.isfinite(array).all():
-        refuse_value(f"target: {name}", values, f"{count} real numbers")
+        refuse_value(name, values, f"{count} real numbers")
     return array
 
 
 def require_positive(name: str, value: Any, unit: str) -> None:  # noqa: ANN401 - checked here
     """Raise InputError if a value is not a number above 0."""
-    require_number(f"target: {name}", value)
+    require_number(name, value)
     if not value > 0:
-        refuse_value(f"target: {name}", value, f"numbers above 0, {unit}")
+        refuse_value(name, value, f"numbers above 0, {unit}")
 
 
 def require_unknowns(unknowns: object, known: Collection[str]) -> None:

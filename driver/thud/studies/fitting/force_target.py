@@ -113,7 +113,7 @@ class ForceTarget(Immutable):
     def compare(self) -> ForceComparison:
         """Return the comparison of an impact with the record."""
         if self.force is not None:
-            require_choice("target: force", self.force, FORCES)
+            require_choice("force", self.force, FORCES)
         if self.noise is not None:
             require_positive("noise", self.noise, "N")
         require_positive("below", self.below, "Hz")
@@ -139,7 +139,7 @@ class ForceTarget(Immutable):
             own[GAIN] = OWN[GAIN]._replace(deviation=self.gain)
             if not known_noise and self.gain < np.inf:
                 refuse(
-                    f"target: gain = {self.gain:g} is not allowed without a known noise",
+                    f"gain = {self.gain:g} is not allowed without a known noise",
                     f"noise, {MIN_BACKGROUND / 2 / self.below:.3g} s of background, or inf",
                 )
         assessed = self.record.assessed_force() if isinstance(self.record, Impact) else "floor"
@@ -157,7 +157,7 @@ class ForceTarget(Immutable):
         """Return the compared part of the record, and its pulse: first sample, and stop."""
         source = self.record
         count = len(source.drops) if isinstance(source, Recording) else 1
-        require_whole("target: drop", self.drop, 1, count)
+        require_whole("drop", self.drop, 1, count)
         if isinstance(source, Recording):
             drop = source.drops[self.drop - 1]
             # Hum and offset that were removed are added: the fit estimates them itself.
@@ -169,12 +169,12 @@ class ForceTarget(Immutable):
                 table = np.column_stack([np.asarray(column, dtype=np.float64) for column in source])
             except (TypeError, ValueError) as error:
                 refuse(
-                    "target cannot be used",
+                    "it cannot be used",
                     "a ForceTarget, LevelTarget, Recording or Impact, or two arrays of one length: "
                     "time, s, and force, N",
                     error,
                 )
-            record = read_record(table, "target")
+            record = read_record(table)
         time, force, rate = record if self.window is None else _cut(record, self.window)
         if isinstance(source, Recording):
             gate = np.searchsorted(time, drop.time[[drop.gate[0], drop.gate[1] - 1]])
@@ -333,9 +333,7 @@ def _cut(record: Record, window: tuple[float, float]) -> Record:
     inside = (time >= begin) & (time <= end)
     if np.count_nonzero(inside) < MIN_SAMPLES or not force[inside].max() > 0:
         refuse_value(
-            "target: window",
-            window,
-            f"begin and end, s, of an impact between {time[0]:g} and {time[-1]:g}",
+            "window", window, f"begin and end, s, of an impact between {time[0]:g} and {time[-1]:g}"
         )
     return Record(time[inside], force[inside], rate)
 
@@ -345,15 +343,15 @@ def _require_record(record: Record, below: float) -> None:
     time, force, rate = record
     if not 2 / len(time) * rate <= below < rate / 2:
         refuse(
-            f"target: below = {below} is not allowed",
+            f"below = {below} is not allowed",
             f"{2 / len(time) * rate:g} <= below < {rate / 2:g} Hz",
         )
     if (count := 2 * below * len(time) / rate) > MAX_COMPARED:
         refuse(
-            f"target: {len(time) / rate:g} s up to {below:g} Hz are {count:.0f} values",
+            f"{len(time) / rate:g} s up to {below:g} Hz are {count:.0f} values",
             f"up to {MAX_COMPARED}: a shorter window, or a lower frequency in below",
         )
     low = np.quantile(force, 0.1)
     last = (force[time > time[-1] - END].mean() - low) / (force.max() - low)
     if last > OPEN_END:
-        refuse(f"target: the force ends with {last:.0%} of its peak", "a record of a whole impact")
+        refuse(f"the force ends with {last:.0%} of its peak", "a record of a whole impact")

@@ -62,9 +62,9 @@ class LevelTarget(Plain):
 
     def compare(self) -> LevelComparison:
         """Return the comparison of an impact with the levels."""
-        require_choice("target: bands", self.bands, BANDWIDTHS)
+        require_choice("bands", self.bands, BANDWIDTHS)
         if self.force is not None:
-            require_choice("target: force", self.force, FORCES)
+            require_choice("force", self.force, FORCES)
         nominal = get_bands(self.bands).nominal.tolist()
         frequencies = nominal
         if self.frequencies is not None:
@@ -73,7 +73,7 @@ class LevelTarget(Plain):
         if not set(frequencies) <= set(nominal) or len(set(frequencies)) < len(frequencies):
             listed = ", ".join(f"{frequency:g}" for frequency in nominal)
             refuse(
-                f"target: frequencies = {shown(self.frequencies)} are not allowed",
+                f"frequencies = {shown(self.frequencies)} are not allowed",
                 f"nominal mid frequencies of {self.bands} bands, {listed}",
             )
         levels = numbers("levels", self.levels, len(frequencies))
@@ -83,10 +83,10 @@ class LevelTarget(Plain):
             if isinstance(entries, float | int):
                 entries = [entries] * len(levels)
             deviation = numbers("uncertainty", entries, len(levels))
-        refuse_unknown("target: quantities", self.quantities, SAMPLE_QUANTITIES)
+        refuse_unknown("quantities", self.quantities, SAMPLE_QUANTITIES)
         quantities = {name: numbers(name, pair, 2) for name, pair in self.quantities.items()}
         if quantities and self.uncertainty is None:
-            refuse("target: uncertainty of the levels is missing", "dB, above 0")
+            refuse("uncertainty of the levels is missing", "dB, above 0")
         target = np.concatenate([levels, [pair[0] for pair in quantities.values()]])
         deviation = np.concatenate([deviation, [pair[1] for pair in quantities.values()]])
         for value in deviation.tolist():
