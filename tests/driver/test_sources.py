@@ -24,13 +24,7 @@ def test_threads_share_no_lengths_of_texts() -> None:
         for result, body in FUNCTION.findall(path.read_text())
         if re.search(rf"character\(len=:\), allocatable :: {result}\b", body)
     }
-    assert deferred == {
-        "command_line.f90",
-        "room_table.f90",
-        "schema.f90",
-        "screen.f90",
-        "screen_tables.f90",
-    }
+    assert deferred == {"room_table.f90", "schema.f90", "screen.f90", "screen_tables.f90"}
 
 
 def test_library_does_not_print() -> None:
