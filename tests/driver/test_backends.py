@@ -40,14 +40,15 @@ MODAL: dict[str, Any] = {
 
 
 class Losing(Executor):
-    """An executor that loses some blocks, in the order in which it is given them."""
+    """An executor that loses some blocks: 1 in the order in which it is given them."""
 
-    def __init__(self, *lost: bool) -> None:
+    def __init__(self, *lost: int) -> None:
         self.lost = iter(lost)
 
     def submit(self, function: Callable[..., Any], *block: Any) -> Future[Any]:  # type: ignore[override] # noqa: ANN401
+        """Compute a block, or cancel it."""
         future: Future[Any] = Future()
-        if next(self.lost, False):
+        if next(self.lost, 0):
             future.cancel()
             future.set_running_or_notify_cancel()
         else:
@@ -75,7 +76,7 @@ def test_every_executor_gives_the_same(cluster: LocalCluster, tmp_path: Path) ->
     assert expected.sizes["sample"] > thud.read_study(STUDY).block_size
     spawn = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(2, spawn) as processes, Client(cluster) as client:
-        for executor in (None, processes, client.get_executor(), Losing(True)):
+        for executor in (None, processes, client.get_executor(), Losing(1)):
             other = thud.sweep(STUDY, executor=executor).dataset
             assert other.drop_attrs(deep=False).identical(expected), executor
     other = thud.sweep(STUDY, tmp_path, workers=3).dataset
@@ -123,7 +124,7 @@ def test_lost_executor_is_reported_and_finished_blocks_are_kept(
         kill_at_first_block(monkeypatch, kill)
         executor: Executor = ProcessPoolExecutor(2, multiprocessing.get_context("spawn"))
     else:
-        executor = Losing(False, False, *[True] * 9)
+        executor = Losing(0, 0, *[1] * 9)
     words = naming("executor", "run the study again", *([] if is_killed else ["Cancelled"]))
     with executor, pytest.raises(thud.NumericalError, match=words):
         thud.sweep(MODAL, tmp_path, executor=executor)
