@@ -8,9 +8,6 @@ module thud_note
 
    public :: get_sentence, get_subject, note_type
 
-   !> Maximum length of what a note says.
-   integer, parameter :: text_length = 240
-
    !> A fact about a group or a key of the input.
    type :: note_type
       !> What it is, for programs.
@@ -22,7 +19,7 @@ module thud_note
       !> Value, and ends of the range in which it should be; NaN if there is none.
       real(wp) :: value = not_a_number, low = not_a_number, high = not_a_number
       !> What it says of its subject.
-      character(len=text_length) :: text = ''
+      character(len=240) :: text = ''
    end type note_type
 
 contains

@@ -5,7 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
-from concurrent.futures import Executor, Future, ProcessPoolExecutor
+from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -40,17 +40,20 @@ MODAL: dict[str, Any] = {
 
 
 class Losing(Executor):
-    """An executor that loses some blocks: 1 in the order in which it is given them."""
+    """An executor that loses blocks with the given errors, None for a result."""
 
-    def __init__(self, *lost: int) -> None:
+    def __init__(self, *lost: Exception | None) -> None:
         self.lost = iter(lost)
 
     def submit(self, function: Callable[..., Any], *block: Any) -> Future[Any]:  # type: ignore[override] # noqa: ANN401
         """Compute a block, or cancel it."""
         future: Future[Any] = Future()
-        if next(self.lost, 0):
+        lost = next(self.lost, None)
+        if isinstance(lost, CancelledError):
             future.cancel()
             future.set_running_or_notify_cancel()
+        elif lost:
+            future.set_exception(lost)
         else:
             future.set_result(function(*block))
         return future
@@ -76,7 +79,7 @@ def test_every_executor_gives_the_same(cluster: LocalCluster, tmp_path: Path) ->
     assert expected.sizes["sample"] > thud.read_study(STUDY).block_size
     spawn = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(2, spawn) as processes, Client(cluster) as client:
-        for executor in (None, processes, client.get_executor(), Losing(1)):
+        for executor in (None, processes, client.get_executor(), Losing(ValueError())):
             other = thud.sweep(STUDY, executor=executor).dataset
             assert other.drop_attrs(deep=False).identical(expected), executor
     other = thud.sweep(STUDY, tmp_path, workers=3).dataset
@@ -124,7 +127,7 @@ def test_lost_executor_is_reported_and_finished_blocks_are_kept(
         kill_at_first_block(monkeypatch, kill)
         executor: Executor = ProcessPoolExecutor(2, multiprocessing.get_context("spawn"))
     else:
-        executor = Losing(0, 0, *[1] * 9)
+        executor = Losing(None, None, *[CancelledError()] * 9)
     words = naming("executor", "run the study again", *([] if is_killed else ["Cancelled"]))
     with executor, pytest.raises(thud.NumericalError, match=words):
         thud.sweep(MODAL, tmp_path, executor=executor)

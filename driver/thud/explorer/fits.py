@@ -118,6 +118,7 @@ def fit_press(paths: Sequence[str], values: Values) -> Answer:
         # Warnings are part of the answer.
         with warnings.catch_warnings(action="ignore"):
             target = CompressionTarget(deflection[used], force[used])
+            target.compare()  # Refuses what is no curve, where it has no other name.
             result = fit(target, ["youngs_modulus"], case)
     except ThudError as error:
         raise error.within(name) from error

@@ -144,9 +144,10 @@ def _terms(case: Case, targets: Sequence[Target], parameters: Sequence[Parameter
     own, row = len(names), 0
     for number, target in enumerate(targets, start=1):
         label = "target" if len(targets) == 1 else f"target {number}"
-        target_case = _with_fixed(case, target.fixed, names, label) if target.fixed else case
+        target_case = case
         try:
             if target.fixed:
+                target_case = _with_fixed(case, target.fixed, names)
                 check_case(replace(target_case, modes=None))
             comparison = target.compare()
         except InputError as error:
@@ -157,17 +158,15 @@ def _terms(case: Case, targets: Sequence[Target], parameters: Sequence[Parameter
     return result
 
 
-def _with_fixed(
-    case: Case, fixed: Mapping[str, object], fitted: AbstractSet[str], label: str
-) -> Case:
+def _with_fixed(case: Case, fixed: Mapping[str, object], fitted: AbstractSet[str]) -> Case:
     """Return the case of a target with its fixed keys."""
-    require_kind(f"{label}: fixed", fixed, Mapping)
+    require_kind("fixed", fixed, Mapping)
     if wrong := [name for name in fixed if name in fitted or name == "model"]:
         refuse(
-            f"{label}: fixed {wrong[0]} is not allowed",
+            f"fixed {wrong[0]} is not allowed",
             "keys of ball, drop and model that are not among [parameters]",
         )
-    result, density = fix_keys(case, fixed, f"{label}: fixed")
+    result, density = fix_keys(case, fixed, "fixed")
     return result if density is None else with_density(result, density)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
-from itertools import chain, islice
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict, TypeVar, Unpack
 
@@ -205,7 +205,7 @@ def _compute(
 
     Raises NumericalError if the executor loses a block twice, after all blocks that are done.
     """
-    waiting: Iterator[int] = iter(starts)
+    waiting = iter(starts)
     lost: set[int] = set()
     running: dict[Future[Columns], tuple[int, Columns]] = {}
     try:
@@ -227,9 +227,10 @@ def _compute(
                     raise
                 except Exception as error:
                     # Dask loses one if the worker ends while its result is on the way.
-                    if start not in lost:
+                    if start not in lost and not future.cancelled():
                         lost.add(start)
-                        waiting = chain([start], waiting)
+                        again = _submit(executor, study, study.key_columns(columns), version())
+                        running[again] = start, columns
                         continue
                     reason = f"{type(error).__name__}: {error}".partition("\n")[0]
                     message = (
@@ -247,7 +248,7 @@ def _submit(executor: Executor, *block: Any) -> Future[Columns]:  # noqa: ANN401
     """Return the future of a block; of an executor that has ended, one that failed."""
     try:
         return executor.submit(evaluate, *block)
-    except RuntimeError as error:
+    except Exception as error:  # noqa: BLE001 - those of any executor
         lost: Future[Columns] = Future()
         lost.set_exception(error)
         return lost

@@ -169,7 +169,7 @@ class ForceTarget(Immutable):
                 table = np.column_stack([np.asarray(column, dtype=np.float64) for column in source])
             except (TypeError, ValueError) as error:
                 refuse(
-                    "it cannot be used",
+                    "the record cannot be used",
                     "a ForceTarget, LevelTarget, Recording or Impact, or two arrays of one length: "
                     "time, s, and force, N",
                     error,
