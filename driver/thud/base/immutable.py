@@ -39,8 +39,7 @@ def freeze(array: NDArray[Any]) -> NDArray[Any]:
 
 def _read_only(value: Any) -> Any:  # noqa: ANN401 - values of any kind
     if isinstance(value, np.ndarray) and value.flags.writeable:
-        value = value.copy()
-        value.setflags(write=False)
+        value = freeze(value.copy())
     if isinstance(value, list | tuple):
         entries = map(_read_only, value)
         return value._make(entries) if hasattr(value, "_make") else tuple(entries)
